@@ -1,0 +1,4 @@
+//! Stub.
+#![no_std]
+#![forbid(unsafe_code)]
+extern crate alloc;
