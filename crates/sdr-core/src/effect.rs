@@ -1,0 +1,160 @@
+//! Everything the brain can ask for. What came of it returns as the next input.
+
+use alloc::{boxed::Box, string::String, vec::Vec};
+use core::net::SocketAddr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    allocate::Problem,
+    api::DeployAnswer,
+    event::Event,
+    id::{ComponentKey, Name, RobotId},
+    input::{InstanceId, PlanId, RequestId, StoreTicket},
+    order::{Epoch, Run, Token},
+    record::FleetKey,
+    spec::{ComponentSpec, Qos},
+};
+
+/// One order to the shell.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    /// Send a datagram, once, without waiting.
+    Send {
+        /// Whither.
+        to: SocketAddr,
+        /// At most 1200 bytes.
+        bytes: Vec<u8>,
+    },
+    /// Put the state on disk, replacing what is there; answered by `Stored`.
+    Store {
+        /// Names the order.
+        ticket: StoreTicket,
+        /// All of it.
+        state: StoredState,
+    },
+    /// Start a process; answered by instance news.
+    Launch(Box<LaunchOrder>),
+    /// Tell an instance something.
+    Command {
+        /// Which one.
+        instance: InstanceId,
+        /// What.
+        command: Command,
+    },
+    /// The data plane between robots should look like this from now on.
+    Routes(Vec<Route>),
+    /// Ask an allocator, off the loop; answered by `Planned`.
+    Plan {
+        /// Names the question.
+        plan: PlanId,
+        /// The question.
+        problem: Box<Problem>,
+    },
+    /// Answer an API client.
+    Answer {
+        /// Whom.
+        request: RequestId,
+        /// What; the error is a sentence for the operator.
+        result: Result<DeployAnswer, String>,
+    },
+    /// Tell operators and the recording.
+    Event(Event),
+}
+
+/// How to start an instance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LaunchOrder {
+    /// Names the instance.
+    pub instance: InstanceId,
+    /// The component it is an instance of.
+    pub component: ComponentKey,
+    /// What to run and with which parameters.
+    pub spec: ComponentSpec,
+    /// Its wired inputs.
+    pub inputs: Vec<InputWiring>,
+    /// Paths of its outputs are `port_path(component, port)`; how deep their readers go.
+    pub output_depth: u8,
+}
+
+/// One connection into an instance.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputWiring {
+    /// Its port.
+    pub port: Name,
+    /// The connection's index in the system.
+    pub connection: u16,
+    /// The output's path in shared memory ([`crate::spec::port_path`]).
+    pub path: String,
+    /// The ROS 2 type.
+    pub message_type: String,
+    /// Depth and deadline.
+    pub qos: Qos,
+}
+
+/// What an instance can be told. All are idempotent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// Execute under this token.
+    Activate(Token),
+    /// Stop executing, stay initialised.
+    Deactivate,
+    /// Deactivate if need be, finalise, end the process; killed when it does not within its grace.
+    Finish,
+    /// End the process at once.
+    Kill,
+    /// Leave the error state.
+    Reset,
+}
+
+/// A port that crosses robots, from this robot's side.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Route {
+    /// The output's path in shared memory; its topic is this behind `rt/`.
+    pub path: String,
+    /// The ROS 2 type.
+    pub message_type: String,
+    /// Reliability and depth.
+    pub qos: Qos,
+    /// Which way.
+    pub direction: Direction,
+    /// Robots at the far end.
+    pub peers: Vec<RobotId>,
+}
+
+/// Which way a route goes, seen from this robot.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Local producer, remote consumers: forward samples that carry this token; none while
+    /// there is no active instance here (endpoints exist and are matched already).
+    Out {
+        /// The token of the local active instance.
+        active: Option<Token>,
+    },
+    /// Remote producer, local consumers.
+    In,
+}
+
+/// What an agent must not forget.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredState {
+    /// Incarnations so far.
+    pub incarnation: u64,
+    /// The fleet table: key, encoded version, value.
+    pub fleet: Vec<StoredRecord>,
+    /// Runs reserved per component: activations up to this number may have been sent.
+    pub runs: Vec<(ComponentKey, Epoch, Run)>,
+    /// Peers heard so far.
+    pub peers: Vec<SocketAddr>,
+}
+
+/// One record of the fleet table on disk.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredRecord {
+    /// What it is about.
+    pub key: FleetKey,
+    /// Its version.
+    pub version: crate::order::Version,
+    /// Its value, as on the wire.
+    pub value: Vec<u8>,
+}

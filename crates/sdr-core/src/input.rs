@@ -1,0 +1,129 @@
+//! Everything the brain can be told.
+
+use alloc::{string::String, vec::Vec};
+use core::net::SocketAddr;
+
+use crate::{
+    allocate::{AllocError, Plan},
+    id::Name,
+    lifecycle::LifecycleState,
+    order::Token,
+    recover::Cause,
+    report::{HostReport, Usage},
+    spec::SystemSpec,
+};
+
+/// Names one started process of a component on this robot; grows within one agent process.
+pub type InstanceId = u64;
+/// Names one request of an API client.
+pub type RequestId = u64;
+/// Names one [`crate::effect::Effect::Store`]; grows.
+pub type StoreTicket = u64;
+/// Names one [`crate::effect::Effect::Plan`]; grows.
+pub type PlanId = u64;
+
+/// One thing that happened outside.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Input {
+    /// Time passed; nothing else.
+    Tick,
+    /// A datagram arrived; any bytes at all.
+    Datagram {
+        /// Whence.
+        from: SocketAddr,
+        /// What, at most 65,535 bytes.
+        bytes: Vec<u8>,
+    },
+    /// A fresh sample of the host's figures, 5 to 10 times a second.
+    Host(HostReport),
+    /// Fresh figures of instances.
+    Usage(Vec<(InstanceId, Usage)>),
+    /// News of an instance.
+    Instance {
+        /// Which one; news of an unknown one is dropped.
+        instance: InstanceId,
+        /// What happened.
+        news: InstanceNews,
+    },
+    /// The DDS endpoints of a route have this many peers now.
+    Route {
+        /// The output's path, as in [`crate::effect::Route`].
+        path: String,
+        /// Matched remote endpoints.
+        matched: u16,
+    },
+    /// An operator wants a system.
+    Deploy {
+        /// To be answered.
+        request: RequestId,
+        /// Checked by the shell, checked again by the brain.
+        system: SystemSpec,
+    },
+    /// An operator wants a system gone.
+    Undeploy {
+        /// To be answered.
+        request: RequestId,
+        /// Which one.
+        system: Name,
+    },
+    /// A plan is ready.
+    Planned {
+        /// Of which question.
+        plan: PlanId,
+        /// The answer.
+        result: Result<Plan, AllocError>,
+    },
+    /// A store order reached the disk.
+    Stored {
+        /// This one, and all before it.
+        ticket: StoreTicket,
+    },
+    /// A store order failed; the disk holds what it held before.
+    StoreFailed {
+        /// Which one.
+        ticket: StoreTicket,
+        /// Why, for people.
+        reason: String,
+    },
+}
+
+/// What happened to an instance.
+#[derive(Clone, Debug, PartialEq)]
+pub enum InstanceNews {
+    /// Its process runs.
+    Started {
+        /// Process id.
+        pid: u32,
+    },
+    /// It could not be started.
+    LaunchFailed {
+        /// Why.
+        reason: String,
+    },
+    /// It said which state it is in.
+    State {
+        /// The state.
+        state: LifecycleState,
+        /// The token it works under, when active.
+        token: Option<Token>,
+        /// Why it is in error, when it is.
+        fault: Option<(Cause, String)>,
+    },
+    /// One of its inputs accepted a greater token.
+    Heard {
+        /// The connection's index in its system.
+        connection: u16,
+        /// The token accepted.
+        token: Token,
+    },
+    /// Its process ended.
+    Exited {
+        /// Status and last lines of output.
+        reason: String,
+    },
+    /// No heartbeat came from its execution thread, or it never connected.
+    Hung {
+        /// What was waited for and how long.
+        reason: String,
+    },
+}

@@ -1,0 +1,144 @@
+//! What the fleet agrees on: records of the fleet table, merged by greatest version.
+//!
+//! A system travels as one small record per component and per connection, so that each
+//! fits a datagram. A [`SystemRecord`] of some revision is complete once as many component
+//! and connection records of that revision are there as it counts.
+
+use alloc::{string::String, vec::Vec};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    id::{ComponentKey, Name, RobotId},
+    spec::{ComponentSpec, ConnectionSpec, PolicyBytes},
+};
+
+/// Longest value of one record, in bytes, so that a datagram of 1200 carries it.
+pub const RECORD_BYTES_MAX: usize = 1000;
+
+/// What a record is about. The number stands on the wire; unknown ones are kept and passed on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct RecordKind(pub u8);
+
+impl RecordKind {
+    /// [`SystemRecord`], keyed by the system.
+    pub const SYSTEM: Self = Self(1);
+    /// [`ComponentSpec`], keyed `system/component`.
+    pub const COMPONENT: Self = Self(2);
+    /// [`ConnectionSpec`], keyed `system/index`.
+    pub const CONNECTION: Self = Self(3);
+    /// Allocation policy ([`PolicyBytes`]), keyed by the system.
+    pub const ALLOCATION: Self = Self(4);
+    /// Recovery policy ([`PolicyBytes`]), keyed by the system.
+    pub const RECOVERY: Self = Self(5);
+    /// [`Assignment`], keyed by the component.
+    pub const ASSIGNMENT: Self = Self(6);
+    /// [`RoleRecord`], keyed by nothing.
+    pub const ROLE: Self = Self(7);
+}
+
+/// Names one shared fact.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct FleetKey {
+    /// What it is about.
+    pub kind: RecordKind,
+    /// Which one, at most 100 bytes.
+    pub name: String,
+}
+
+/// A system: what belongs to it, and whether it should run at all.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SystemRecord {
+    /// Its name.
+    pub name: Name,
+    /// Who took it from the operator.
+    pub receiver: RobotId,
+    /// How many component records of this revision belong to it; none once undeployed.
+    pub components: u16,
+    /// How many connection records of this revision belong to it.
+    pub connections: u16,
+    /// Whether it should run; an undeployed system stays as a tombstone.
+    pub wanted: bool,
+}
+
+/// Where one component should run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Assignment {
+    /// Which component.
+    pub component: ComponentKey,
+    /// Where the active instance runs.
+    pub home: RobotId,
+    /// Standbys in order of succession. A move first lists its target here.
+    pub standbys: Vec<RobotId>,
+    /// The home before, which may go on until its consumers have switched (a planned move).
+    pub drains: Option<RobotId>,
+    /// The deployment's revision this belongs to.
+    pub deployment: u64,
+    /// Why, in a few words with numbers.
+    pub reason: String,
+}
+
+/// Who holds the coordinator role; its term and holder are the record's version.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoleRecord {
+    /// The holder.
+    pub holder: RobotId,
+    /// Grows with each holder.
+    pub term: u64,
+    /// The fitness it took the role with, for people.
+    pub fitness: u32,
+}
+
+/// A checked value of the fleet table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FleetValue {
+    /// A system.
+    System(SystemRecord),
+    /// A component of a system.
+    Component(ComponentSpec),
+    /// A connection of a system.
+    Connection(ConnectionSpec),
+    /// An allocation policy.
+    Allocation(PolicyBytes),
+    /// A recovery policy.
+    Recovery(PolicyBytes),
+    /// A home.
+    Assignment(Assignment),
+    /// The role.
+    Role(RoleRecord),
+    /// A kind that this version does not know; kept and passed on.
+    Unknown,
+}
+
+impl FleetValue {
+    /// Reads the bytes of a record of `kind`; bytes behind the known fields are skipped.
+    pub fn decode(kind: RecordKind, bytes: &[u8]) -> Result<Self, postcard::Error> {
+        fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, postcard::Error> {
+            postcard::take_from_bytes(bytes).map(|(value, _later_fields)| value)
+        }
+        match kind {
+            RecordKind::SYSTEM => take(bytes).map(Self::System),
+            RecordKind::COMPONENT => take(bytes).map(Self::Component),
+            RecordKind::CONNECTION => take(bytes).map(Self::Connection),
+            RecordKind::ALLOCATION => take(bytes).map(Self::Allocation),
+            RecordKind::RECOVERY => take(bytes).map(Self::Recovery),
+            RecordKind::ASSIGNMENT => take(bytes).map(Self::Assignment),
+            RecordKind::ROLE => take(bytes).map(Self::Role),
+            _ => Ok(Self::Unknown),
+        }
+    }
+
+    /// The bytes of the record; empty for unknown kinds, whose bytes stand beside it.
+    pub fn encode(&self) -> Vec<u8> {
+        let bytes = match self {
+            Self::System(value) => postcard::to_allocvec(value),
+            Self::Component(value) => postcard::to_allocvec(value),
+            Self::Connection(value) => postcard::to_allocvec(value),
+            Self::Allocation(value) | Self::Recovery(value) => postcard::to_allocvec(value),
+            Self::Assignment(value) => postcard::to_allocvec(value),
+            Self::Role(value) => postcard::to_allocvec(value),
+            Self::Unknown => Ok(Vec::new()),
+        };
+        bytes.expect("writing plain data to memory cannot fail")
+    }
+}

@@ -1,0 +1,232 @@
+//! The seam for recovery: evidence in, verdicts out.
+//!
+//! Each robot judges its own components with one [`Recovery`] per system; robots that are
+//! gone are judged by the coordinator. Local remedies are carried out at once; the others
+//! are published as a condition on which the coordinator acts.
+
+use alloc::{string::String, vec::Vec};
+use core::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    id::ComponentKey,
+    time::Instant,
+    units::{Bytes, Dbm, Permille},
+};
+
+/// What is wrong: the rows of the paper's Table III, and our own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cause {
+    /// Free memory of the robot is short.
+    MemoryShort,
+    /// The component takes too much CPU.
+    ComponentCpuHigh,
+    /// Its process ended, or never came up.
+    Exited,
+    /// No heartbeat from the execution thread.
+    Hung,
+    /// Error state without a reason.
+    Error,
+    /// Error state: hardware failed or was disconnected.
+    HardwareLost,
+    /// Error state: the robot behaves abnormally.
+    AbnormalBehaviour,
+    /// Error state: an emergency stop.
+    EmergencyStop,
+    /// The battery is low.
+    BatteryLow,
+    /// The robot takes too much CPU.
+    RobotCpuHigh,
+    /// The radio level is low.
+    RssiLow,
+    /// Links are slow.
+    DelayHigh,
+    /// Links are uneven.
+    JitterHigh,
+    /// Links lose too much.
+    LossHigh,
+    /// The robot is not heard any more.
+    RobotGone,
+}
+
+impl Cause {
+    /// The word that stands in policies, events and reports.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::MemoryShort => "memory-short",
+            Self::ComponentCpuHigh => "component-cpu-high",
+            Self::Exited => "exited",
+            Self::Hung => "hung",
+            Self::Error => "error",
+            Self::HardwareLost => "hardware-lost",
+            Self::AbnormalBehaviour => "abnormal-behaviour",
+            Self::EmergencyStop => "emergency-stop",
+            Self::BatteryLow => "battery-low",
+            Self::RobotCpuHigh => "robot-cpu-high",
+            Self::RssiLow => "rssi-low",
+            Self::DelayHigh => "delay-high",
+            Self::JitterHigh => "jitter-high",
+            Self::LossHigh => "loss-high",
+            Self::RobotGone => "robot-gone",
+        }
+    }
+}
+
+impl core::fmt::Display for Cause {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.pad(self.word())
+    }
+}
+
+/// What to try; the order of variants is the order of severity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Remedy {
+    /// Switch to a standby on the same robot.
+    LocalStandby,
+    /// End the process and start it anew on the same robot, not before `after` from now.
+    Restart {
+        /// Backoff.
+        after: Duration,
+    },
+    /// Switch to a standby on another robot.
+    StandbyElsewhere,
+    /// Start it on another robot.
+    LaunchElsewhere,
+    /// Stop trying, say so.
+    Hold,
+}
+
+impl Remedy {
+    /// The word that stands in policies, events and reports.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::LocalStandby => "local-standby",
+            Self::Restart { .. } => "restart",
+            Self::StandbyElsewhere => "standby-elsewhere",
+            Self::LaunchElsewhere => "launch-elsewhere",
+            Self::Hold => "hold",
+        }
+    }
+}
+
+/// What was last seen of one component and the robot under it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// Which component.
+    pub component: ComponentKey,
+    /// It moves a body.
+    pub actuator: bool,
+    /// A fault that happened since the last judgement (exit, hang, error, robot gone).
+    pub fault: Option<Fault>,
+    /// A standby on the same robot is ready.
+    pub standby_here: bool,
+    /// A standby on another robot is ready.
+    pub standby_elsewhere: bool,
+    /// Its own memory.
+    pub memory: Bytes,
+    /// Its own CPU, thousandths of one core.
+    pub cpu: Permille,
+    /// Its declared CPU need; zero when none was declared.
+    pub cpu_limit: Permille,
+    /// Figures of the robot.
+    pub robot: RobotEvidence,
+}
+
+/// Figures of the robot under a component.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RobotEvidence {
+    /// Capacity less measured use.
+    pub memory_free: Option<Bytes>,
+    /// CPU used, thousandths of the robot's capacity (1000 = all of it).
+    pub cpu: Option<Permille>,
+    /// Charge.
+    pub battery: Option<Permille>,
+    /// Radio level, one raw sample.
+    pub rssi: Option<Dbm>,
+    /// Half a round trip, median over the links its connections use.
+    pub delay: Option<Duration>,
+    /// Jitter, median over those links.
+    pub jitter: Option<Duration>,
+    /// Loss, median over those links.
+    pub loss: Option<Permille>,
+}
+
+/// A fault as an event.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fault {
+    /// What is wrong.
+    pub cause: Cause,
+    /// With the exit status or the last output, for people.
+    pub reason: String,
+}
+
+/// What a policy wants done for one component.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Which component.
+    pub component: ComponentKey,
+    /// Why.
+    pub cause: Cause,
+    /// What to try.
+    pub remedy: Remedy,
+    /// With numbers: `rssi -54.8 dBm, bar -52.5 dBm, held 6.0 s`.
+    pub reason: String,
+    /// When the cause had held for its whole time.
+    pub held_over_at: Instant,
+}
+
+/// How a cause stands, for people and recordings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CauseStatus {
+    /// Which component.
+    pub component: ComponentKey,
+    /// What is being watched.
+    pub cause: Cause,
+    /// When it began to hold.
+    pub since: Instant,
+    /// How long it must hold.
+    pub hold: Duration,
+    /// Whether it is raised (held for its time, not yet cleared).
+    pub raised: bool,
+    /// With numbers.
+    pub reason: String,
+}
+
+/// What came of a remedy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RemedyOutcome {
+    /// It could not be done (no home fits, no standby is ready).
+    Refused,
+    /// It was done; whether it helps is seen from the evidence.
+    Done,
+}
+
+/// Judges faults by a policy.
+///
+/// Holds the timers and the place on the ladder of each component; keeps no clock, no
+/// channel and no log. Equal calls give equal answers.
+pub trait Recovery {
+    /// Looks at fresh evidence of all components of its system on this robot (for gone
+    /// robots: at the coordinator) and says what should be done now.
+    ///
+    /// Called at each report (5 to 10 Hz), at each fault, and at [`Self::next_deadline`].
+    fn judge(&mut self, now: Instant, evidence: &[Evidence]) -> Vec<Verdict>;
+
+    /// Learns what came of a verdict.
+    fn outcome(&mut self, now: Instant, component: &ComponentKey, outcome: RemedyOutcome);
+
+    /// Forgets a component that left this robot or was undeployed.
+    fn forget(&mut self, component: &ComponentKey);
+
+    /// When `judge` should be called again at the latest.
+    fn next_deadline(&self) -> Option<Instant>;
+
+    /// Causes that hold now, raised or not yet.
+    fn standing(&self) -> Vec<CauseStatus>;
+
+    /// How long a component must not come back to a robot that it left for a cause.
+    fn not_back_for(&self) -> Duration;
+}

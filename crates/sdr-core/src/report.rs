@@ -1,0 +1,136 @@
+//! What a robot says of itself: records in its author's table.
+//!
+//! Fields are only ever appended; a reader that does not know the last ones skips them.
+
+use alloc::{string::String, vec::Vec};
+use core::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    id::{ComponentKey, Name, RobotId},
+    lifecycle::LifecycleState,
+    order::Token,
+    recover::{Cause, Remedy},
+    units::{Bytes, Dbm, Permille, Position},
+};
+
+/// What rarely changes: the body and its limits.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RobotFacts {
+    /// Memory that components may use in all.
+    pub memory_capacity: Bytes,
+    /// CPU that components may use in all, thousandths of one core.
+    pub cpu_capacity: Permille,
+    /// Free words that a system may ask for.
+    pub labels: Vec<String>,
+    /// Parts of the body.
+    pub devices: Vec<Name>,
+    /// Hashes of what it can launch ([`crate::spec::launch_hash`]), sorted.
+    pub launchables: Vec<u32>,
+    /// Preference for the coordinator role.
+    pub role: RolePreference,
+    /// Where its API listens, for tools on the same machine.
+    pub api: String,
+    /// The agent's version.
+    pub version: String,
+}
+
+/// Whether a robot should hold the coordinator role.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RolePreference {
+    /// Before all others while it lives.
+    Preferred,
+    /// By fitness.
+    #[default]
+    Able,
+    /// Never.
+    Forbidden,
+}
+
+/// What changes by the second.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HostReport {
+    /// Memory used by the agent and all below it (PSS).
+    pub memory_used: Bytes,
+    /// CPU used by the agent and all below it, thousandths of one core.
+    pub cpu_used: Permille,
+    /// Charge, 0..=1000; `None` when nobody can tell.
+    pub battery: Option<Permille>,
+    /// Radio level towards the access point or mesh; `None` when unknown, never zero.
+    pub rssi: Option<Dbm>,
+    /// Where it stands.
+    pub position: Option<Position>,
+}
+
+/// What the agent measured of one pair of robots.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LinkReport {
+    /// Round trip, median of the last samples.
+    pub rtt: Duration,
+    /// Mean change from one round trip to the next (RFC 3550, section 6.4.1).
+    pub jitter: Duration,
+    /// Lost datagrams of the last 64, thousandths.
+    pub loss: Permille,
+}
+
+/// What an instance does on its robot.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InstanceReport {
+    /// The component it is an instance of.
+    pub component: ComponentKey,
+    /// Its state.
+    pub state: LifecycleState,
+    /// The token it works under; `None` while it is only prepared.
+    pub token: Option<Token>,
+    /// Initialised and, when it has remote peers, connected to them: activation is instant.
+    pub ready: bool,
+    /// What it takes.
+    pub usage: Usage,
+    /// Per input connection (index in the system): the greatest token accepted.
+    pub heard: Vec<(u16, Token)>,
+    /// Restarts under the present epoch.
+    pub restarts: u16,
+}
+
+/// Measured use of one instance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Usage {
+    /// Memory (PSS).
+    pub memory: Bytes,
+    /// CPU, thousandths of one core.
+    pub cpu: Permille,
+}
+
+/// A home in trouble says so; the coordinator acts.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ConditionReport {
+    /// The system concerned.
+    pub system: Name,
+    /// What is wrong.
+    pub cause: Cause,
+    /// Components that should leave, placed as one problem.
+    pub components: Vec<Name>,
+    /// The rung the ladder stands on.
+    pub remedy: Remedy,
+    /// With numbers, for people.
+    pub reason: String,
+    /// Milliseconds since the cause had held for its whole time, when this was made.
+    pub held_over_ms: u64,
+}
+
+/// Everything an author may say, one record each.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Report {
+    /// The body.
+    Facts(RobotFacts),
+    /// Host figures.
+    Host(HostReport),
+    /// A link to another robot.
+    Link(RobotId, LinkReport),
+    /// An instance.
+    Instance(InstanceReport),
+    /// Trouble.
+    Condition(ConditionReport),
+}
