@@ -41,7 +41,9 @@ pub mod allocate;
 pub mod event;
 pub mod recover;
 
+pub mod brain;
 pub mod effect;
 pub mod input;
 
 pub mod api;
+pub mod recording;

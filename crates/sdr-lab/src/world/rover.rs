@@ -112,14 +112,13 @@ impl Rover {
         let way = self.speed * seconds;
         let x = self.pose.x + way * middle.cos();
         let y = self.pose.y + way * middle.sin();
-        let free = is_free(x, y) && !object.is_some_and(|object| object.touches(x, y, RADIUS_M));
-        if free {
+        let yaw = self.pose.yaw + self.turn * seconds;
+        if is_free(x, y) && !object.is_some_and(|object| object.touches(x, y, RADIUS_M)) {
             self.distance_m += way.abs();
-            self.pose = Pose::new(x, y, self.pose.yaw + self.turn * seconds);
+            self.pose = Pose::new(x, y, yaw);
         } else {
             self.speed = 0.0;
-            self.pose = Pose { yaw: self.pose.yaw, ..self.pose };
-            self.pose = Pose::new(self.pose.x, self.pose.y, self.pose.yaw + self.turn * seconds);
+            self.pose = Pose::new(self.pose.x, self.pose.y, yaw);
         }
         self.count_stops();
         self.sense(now_ns, seconds, (self.speed - before) / seconds);

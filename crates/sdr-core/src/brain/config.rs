@@ -1,0 +1,65 @@
+//! What a brain is given at its start.
+
+use alloc::{boxed::Box, string::String, vec::Vec};
+use core::{fmt, net::SocketAddr, time::Duration};
+
+use crate::{id::RobotId, recover::Recovery, report::RobotFacts, spec::PolicyBytes};
+
+/// Who the robot is and how patient it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrainConfig {
+    /// Its name.
+    pub robot: RobotId,
+    /// Its fleet; datagrams of other fleets are dropped.
+    pub fleet: String,
+    /// Its body and limits.
+    pub facts: RobotFacts,
+    /// Where other robots listen: seeds from robot.toml.
+    pub seeds: Vec<SocketAddr>,
+    /// Where others reach this robot, when it knows.
+    pub listen: Option<SocketAddr>,
+    /// From the operating system's randomness: incarnation nonce and seed.
+    pub seed: u64,
+    /// Time between two rounds of gossip; default 250 ms.
+    pub gossip_period: Duration,
+    /// Age of the last fresh news at which a robot counts as gone; default 10 s.
+    pub gone_after: Duration,
+    /// How long after the start to wait for a peer before activating what is remembered;
+    /// default 2 s.
+    pub rejoin_wait: Duration,
+    /// How long an old home may go on in a planned move; default 1 s.
+    pub drain_max: Duration,
+    /// How long the target of a move may take to get ready; default 30 s.
+    pub prepare_max: Duration,
+}
+
+impl BrainConfig {
+    /// The defaults for robot `robot` with `facts`.
+    pub fn new(robot: RobotId, facts: RobotFacts) -> Self {
+        Self {
+            robot,
+            fleet: String::from("fleet"),
+            facts,
+            seeds: Vec::new(),
+            listen: None,
+            seed: 0,
+            gossip_period: Duration::from_millis(250),
+            gone_after: Duration::from_secs(10),
+            rejoin_wait: Duration::from_secs(2),
+            drain_max: Duration::from_secs(1),
+            prepare_max: Duration::from_secs(30),
+        }
+    }
+}
+
+/// What other crates fill in.
+pub struct Seams {
+    /// Makes the recovery engine of a system from its policy; the error is for people.
+    pub recovery: Box<dyn Fn(&PolicyBytes) -> Result<Box<dyn Recovery + Send>, String> + Send>,
+}
+
+impl fmt::Debug for Seams {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Seams")
+    }
+}
