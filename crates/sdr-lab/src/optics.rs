@@ -35,7 +35,8 @@ pub enum Lens {
 
 impl Lens {
     /// The perspective camera of the rovers: 70 degrees.
-    pub const PERSPECTIVE: Self = Self::Perspective { hfov_rad: 70.0 / 180.0 * std::f64::consts::PI };
+    pub const PERSPECTIVE: Self =
+        Self::Perspective { hfov_rad: 70.0 / 180.0 * std::f64::consts::PI };
     /// The fisheye of the rovers: 180 degrees.
     pub const FISHEYE: Self = Self::Fisheye { fov_rad: std::f64::consts::PI };
 

@@ -66,8 +66,7 @@ pub struct Fade {
 
 impl Fade {
     /// The paper's: a shield of mesh over the robot.
-    pub const SHIELD: Self =
-        Self { from_dbm: -47.0, to_dbm: -55.0, over: Duration::from_secs(2) };
+    pub const SHIELD: Self = Self { from_dbm: -47.0, to_dbm: -55.0, over: Duration::from_secs(2) };
 
     /// Mean level `after` the start.
     pub fn level_dbm(&self, after: Duration) -> f64 {

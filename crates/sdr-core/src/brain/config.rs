@@ -52,10 +52,14 @@ impl BrainConfig {
     }
 }
 
+/// Makes a recovery engine from a policy; the error is for people.
+pub type MakeRecovery =
+    Box<dyn Fn(&PolicyBytes) -> Result<Box<dyn Recovery + Send>, String> + Send>;
+
 /// What other crates fill in.
 pub struct Seams {
-    /// Makes the recovery engine of a system from its policy; the error is for people.
-    pub recovery: Box<dyn Fn(&PolicyBytes) -> Result<Box<dyn Recovery + Send>, String> + Send>,
+    /// Makes the recovery engine of a system from its policy.
+    pub recovery: MakeRecovery,
 }
 
 impl fmt::Debug for Seams {

@@ -37,6 +37,7 @@ pub use camera::{CameraClient, Frame};
 pub use error::DeviceError;
 pub(crate) use line::{LineBuffer, LineError};
 pub use wheels::WheelsClient;
+pub(crate) use wheels::check as check_command;
 
 pub use crate::world::rover::{Command, WheelReading};
 

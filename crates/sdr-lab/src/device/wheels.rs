@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
@@ -73,18 +73,20 @@ impl WheelsClient {
 
     /// Waits until there is a reading, at most `timeout`; returns all there are.
     pub fn wait(&mut self, timeout: Duration) -> Result<Vec<WheelReading>, DeviceError> {
-        let readings = self.readings()?;
-        if !readings.is_empty() {
-            return Ok(readings);
+        let deadline = Instant::now() + timeout;
+        loop {
+            let readings = self.readings()?;
+            if !readings.is_empty() {
+                return Ok(readings);
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Err(DeviceError::Silent { waited_ms: timeout.as_millis() });
+            }
+            let limit = Timespec::try_from(left).ok();
+            poll(&mut [PollFd::new(&self.stream, PollFlags::IN)], limit.as_ref())
+                .map_err(|errno| DeviceError::Broken(errno.into()))?;
         }
-        let limit = Timespec::try_from(timeout).ok();
-        poll(&mut [PollFd::new(&self.stream, PollFlags::IN)], limit.as_ref())
-            .map_err(|errno| DeviceError::Broken(errno.into()))?;
-        let readings = self.readings()?;
-        if readings.is_empty() {
-            return Err(DeviceError::Silent { waited_ms: timeout.as_millis() });
-        }
-        Ok(readings)
     }
 
     /// What the wheels said of themselves.
