@@ -130,7 +130,7 @@ pub fn wireless_text(interface: &str, level_dbm: f64, noise_dbm: f64) -> String 
 
 /// The text of /sys/class/power_supply/*/capacity: whole percent.
 pub fn capacity_text(percent: f64) -> String {
-    format!("{}\n", rounded(percent.floor()).clamp(0, 100))
+    format!("{}\n", rounded(percent).clamp(0, 100))
 }
 
 /// Replaces a file at once: readers see the old or the new text, never a part.
@@ -201,7 +201,7 @@ mod tests {
             lines[2],
             " wlan0: 0000   63.  -47.  -94.       0      0      0      0      0        0"
         );
-        assert_eq!(capacity_text(80.9), "80\n");
+        assert_eq!(capacity_text(79.9), "80\n");
         assert_eq!(capacity_text(-1.0), "0\n");
     }
 }

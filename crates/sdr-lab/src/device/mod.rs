@@ -35,7 +35,7 @@ use serde::{Deserialize, Serialize};
 
 pub use camera::{CameraClient, Frame};
 pub use error::DeviceError;
-pub(crate) use line::{LineBuffer, LineError};
+pub(crate) use line::LineBuffer;
 pub use wheels::WheelsClient;
 pub(crate) use wheels::check as check_command;
 

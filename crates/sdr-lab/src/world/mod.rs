@@ -19,7 +19,7 @@ pub use camera::{CAMERA_HEIGHT_M, Camera, Scene};
 pub use config::{Appearance, Drive, RobotPaths, RoverConfig, WorldConfig};
 pub use error::WorldError;
 pub use handle::WorldHandle;
-pub use rover::{Rover, SPEED_MAX_M_S, TRACK_M, TURN_MAX_RAD_S};
+pub use rover::{RADIUS_M, Rover, SPEED_MAX_M_S, TRACK_M, TURN_MAX_RAD_S, WATCHDOG_NS};
 pub use state::{CommandGaps, RoverSnapshot, Snapshot, monotonic_ns};
 
 /// The world; see [`World::start`].

@@ -68,7 +68,7 @@ impl Peer {
                     self.lines += 1;
                     let reason = format!("line {}: longer than 512 bytes; hanging up", self.lines);
                     self.refuse(&reason);
-                    self.state = State::Closing;
+                    self.hang_up();
                     return lines;
                 }
             }
@@ -82,7 +82,15 @@ impl Peer {
         line.push('\n');
         self.send(line.as_bytes());
         if self.errors >= ERRORS_MAX {
+            self.hang_up();
+        }
+    }
+
+    /// Reads no more and ends when all is written.
+    fn hang_up(&mut self) {
+        if self.state == State::Open {
             self.state = State::Closing;
+            self.flush();
         }
     }
 
