@@ -11,7 +11,7 @@ use crate::{
     event::Event,
     id::{ComponentKey, Name, RobotId},
     input::{InstanceId, PlanId, RequestId, StoreTicket},
-    order::{Epoch, Run, Token},
+    order::{Run, Token},
     record::FleetKey,
     spec::{ComponentSpec, Qos},
 };
@@ -142,8 +142,8 @@ pub struct StoredState {
     pub incarnation: u64,
     /// The fleet table: key, encoded version, value.
     pub fleet: Vec<StoredRecord>,
-    /// Runs reserved per component: activations up to this number may have been sent.
-    pub runs: Vec<(ComponentKey, Epoch, Run)>,
+    /// Runs reserved per component: activations below this number may have been sent.
+    pub runs: Vec<(ComponentKey, Run)>,
     /// Peers heard so far.
     pub peers: Vec<SocketAddr>,
 }

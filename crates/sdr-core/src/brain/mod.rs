@@ -4,7 +4,7 @@ mod config;
 
 use alloc::{boxed::Box, collections::VecDeque};
 
-pub use config::{BrainConfig, Seams};
+pub use config::{BrainConfig, MakeRecovery, Seams};
 
 use crate::{
     api::StatusView,
