@@ -1,1 +1,3 @@
-//! Stub.
+//! What a component author uses: `trait Component`, typed ports, `run()`.
+
+pub mod protocol;
