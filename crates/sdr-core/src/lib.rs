@@ -29,7 +29,9 @@ extern crate alloc;
 
 pub mod id;
 pub mod lifecycle;
+pub mod mesh;
 pub mod order;
+pub mod rng;
 pub mod time;
 pub mod units;
 
