@@ -15,14 +15,15 @@ use sdr_lab::{World, WorldConfig, WorldHandle};
 const LIMIT: Duration = Duration::from_secs(20);
 
 fn world(folder: &Path) -> WorldHandle {
-    World::start(WorldConfig::convoy(folder, "robot-2", &["robot-1", "robot-3"], 1)).unwrap()
+    World::start(WorldConfig::convoy(folder, "robot-2", &["robot-1", "robot-3"], 1))
+        .expect("a fresh folder takes a world")
 }
 
 fn lines_of(path: &Path) -> (UnixStream, BufReader<UnixStream>) {
-    let stream = UnixStream::connect(path).unwrap();
-    stream.set_read_timeout(Some(LIMIT)).unwrap();
-    let mut lines = BufReader::new(stream.try_clone().unwrap());
-    lines.read_line(&mut String::new()).unwrap();
+    let stream = UnixStream::connect(path).expect("the device listens");
+    stream.set_read_timeout(Some(LIMIT)).expect("the limit is not zero");
+    let mut lines = BufReader::new(stream.try_clone().expect("descriptors are left"));
+    lines.read_line(&mut String::new()).expect("the device greets");
     (stream, lines)
 }
 

@@ -1,0 +1,10 @@
+//! Where the rover is: wheels and gyro carry the estimate, landmarks correct it.
+
+mod filter;
+mod odometer;
+
+pub use filter::{Correction, Estimator, Observation, Spread};
+pub use odometer::{DeadReckoning, Motion, Odometer};
+
+#[cfg(test)]
+mod tests;
