@@ -1,2 +1,93 @@
-//! Stub.
-fn main() {}
+//! `sdr`, the operator's tool: one sentence in, one request to an agent, one answer out.
+//!
+//! ```text
+//!  arguments ─▶ command/x ─▶ client ─ HTTP + JSON ─▶ sdr-agent's Unix socket
+//!                   │           │
+//!                   ▼           ▼ views of sdr_core::api
+//!                render ─▶ output ─▶ stdout, stderr
+//! ```
+//!
+//! Files are read and checked here (`sdr-files`), so that a bad file is refused with its line
+//! before anything is sent. Exit code 0: done, 1: failed or something is wrong, 2: wrong usage.
+
+mod client;
+mod command;
+mod demo;
+mod failure;
+mod locate;
+mod output;
+mod render;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::{
+    command::{completions, events, logs, status, undeploy},
+    failure::Failure,
+    output::{Format, Output},
+};
+
+/// What every command is given.
+pub(crate) struct Session {
+    /// `--agent` or `SDR_AGENT`.
+    pub(crate) agent: Option<String>,
+    /// Where answers go, and in which form.
+    pub(crate) output: Output,
+}
+
+/// Runs components of one system on a team of robots.
+#[derive(Debug, Parser)]
+#[command(name = "sdr", version, about, max_term_width = 80)]
+struct Cli {
+    /// Unix socket of the agent to ask [default: /run/sdr/agent.sock]
+    #[arg(long, global = true, env = "SDR_AGENT", value_name = "ADDRESS", hide_env_values = true)]
+    agent: Option<String>,
+    /// Text for people, or JSON alone on stdout
+    #[arg(short, long, global = true, value_enum, default_value_t)]
+    output: Format,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Have the fleet end a system
+    Undeploy(undeploy::UndeployArgs),
+    /// Show robots, systems and what is wrong with them
+    Status(status::StatusArgs),
+    /// Show what happened and was decided, with reasons
+    Events(events::EventsArgs),
+    /// Show what a component wrote
+    Logs(logs::LogsArgs),
+    /// Make a report from the agents' recordings
+    Report(report::ReportArgs),
+    /// Run three robots, five components and one move on this machine
+    Demo(demo::DemoArgs),
+    /// Print a completion script for a shell
+    Completions(completions::CompletionsArgs),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let session = Session { agent: cli.agent, output: Output::new(cli.output) };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let ended = match runtime {
+        Ok(runtime) => runtime.block_on(run(cli.command, &session)),
+        Err(error) => Err(Failure::new(format!("cannot start: {error}"))),
+    };
+    ended.unwrap_or_else(|failure| failure.tell(&session.output))
+}
+
+async fn run(command: Command, session: &Session) -> Result<ExitCode, Failure> {
+    match command {
+        Command::Undeploy(args) => undeploy::run(args, session).await,
+        Command::Status(args) => status::run(args, session).await,
+        Command::Events(args) => events::run(args, session).await,
+        Command::Logs(args) => logs::run(args, session).await,
+        Command::Report(args) => report::run(args, session).await,
+        Command::Demo(args) => demo::run(args, session).await,
+        Command::Completions(args) => completions::run::<Cli>(args, session),
+    }
+}

@@ -1,0 +1,77 @@
+//! Asks component executables what ports and parameters they have (`--describe`).
+
+use std::{path::Path, process::Stdio, time::Duration};
+
+use sdr_core::spec::{ComponentProfile, Launch, SystemSpec};
+use tokio::{io::AsyncReadExt, process::Command, time::timeout};
+
+use crate::locate;
+
+/// How long an executable may take to describe itself.
+const DESCRIBE_WITHIN: Duration = Duration::from_secs(5);
+/// Longest description that is read.
+const DESCRIPTION_BYTES_MAX: u64 = 1 << 20;
+
+/// Profiles of the system's executables in `folder`, and why others have none.
+pub(super) async fn profiles(
+    system: &SystemSpec,
+    folder: &Path,
+) -> (Vec<ComponentProfile>, Vec<String>) {
+    let mut names: Vec<&str> = Vec::new();
+    for component in &system.components {
+        let Launch::Native { executable, .. } = &component.launch;
+        if !names.contains(&executable.as_str()) {
+            names.push(executable);
+        }
+    }
+    let (mut found, mut missing) = (Vec::new(), Vec::new());
+    for name in names {
+        match describe(&folder.join(name)).await {
+            Ok(mut profile) => {
+                // It is launched by its file name, whatever it calls itself.
+                profile.name = name.into();
+                found.push(profile);
+            }
+            Err(reason) => missing.push(reason),
+        }
+    }
+    (found, missing)
+}
+
+async fn describe(program: &Path) -> Result<ComponentProfile, String> {
+    let shown = program.display();
+    if !locate::is_program(program) {
+        return Err(format!("no program {shown}"));
+    }
+    let answer = timeout(DESCRIBE_WITHIN, output_of(program)).await;
+    let text = match answer {
+        Ok(Ok(text)) => text,
+        Ok(Err(error)) => return Err(format!("{shown} --describe: {error}")),
+        Err(_) => {
+            let seconds = DESCRIBE_WITHIN.as_secs();
+            return Err(format!("{shown} --describe did not end within {seconds} s"));
+        }
+    };
+    serde_json::from_slice(&text)
+        .map_err(|error| format!("{shown} --describe printed no component profile: {error}"))
+}
+
+/// What the program prints; it ends with us.
+async fn output_of(program: &Path) -> std::io::Result<Vec<u8>> {
+    let mut child = Command::new(program)
+        .arg("--describe")
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .kill_on_drop(true)
+        .spawn()?;
+    let mut text = Vec::new();
+    if let Some(stdout) = child.stdout.take() {
+        stdout.take(DESCRIPTION_BYTES_MAX).read_to_end(&mut text).await?;
+    }
+    let status = child.wait().await?;
+    match status.success() {
+        true => Ok(text),
+        false => Err(std::io::Error::other(format!("it ended with {status}"))),
+    }
+}

@@ -1,0 +1,237 @@
+//! `sdr status`: what is wrong first, then robots, then systems.
+
+use sdr_core::{
+    api::{ComponentView, RobotView, StatusView, SystemView},
+    lifecycle::LifecycleState,
+};
+
+use super::{
+    table::Table,
+    units::{NOTHING, count, level, megabytes, one_line, percent, span, wrap},
+};
+
+/// The whole screen.
+pub(crate) fn screen(view: &StatusView, columns: usize) -> Vec<String> {
+    let mut lines = Vec::new();
+    for problem in problems(view) {
+        lines.extend(wrap(&format!("! {}", problem.text), columns, "  "));
+        for detail in &problem.details {
+            lines.extend(wrap(&format!("    {detail}"), columns, "      "));
+        }
+    }
+    if !lines.is_empty() {
+        lines.push(String::new());
+    }
+    lines.extend(wrap(&head(view), columns, "  "));
+    lines.push(String::new());
+    lines.extend(robots(view).lines(columns));
+    for system in &view.systems {
+        lines.push(String::new());
+        lines.extend(wrap(&system_head(system), columns, "  "));
+        lines.extend(components(system).lines(columns));
+    }
+    lines.extend(conditions(view, columns));
+    lines.extend(next_step(view));
+    lines
+}
+
+/// One thing that is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Problem {
+    /// A sentence.
+    pub(crate) text: String,
+    /// Numbers beside their bars.
+    pub(crate) details: Vec<String>,
+}
+
+impl Problem {
+    fn new(text: String) -> Self {
+        Self { text: one_line(&text), details: Vec::new() }
+    }
+}
+
+/// What is not as it should be; empty when all is well.
+pub(crate) fn problems(view: &StatusView) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    for system in &view.systems {
+        let parts = system.components.iter();
+        problems.extend(parts.filter_map(|component| trouble(component, view)));
+        problems.extend(silent_connections(system));
+    }
+    let quiet = view.robots.iter().filter(|robot| !robot.alive);
+    problems.extend(quiet.map(|robot| {
+        Problem::new(format!(
+            "{} is quiet for {} (last: battery {}, {} free)",
+            robot.name,
+            span(robot.seen_ms),
+            battery(robot),
+            megabytes(robot.memory_free_bytes)
+        ))
+    }));
+    if view.coordinator.is_none() {
+        problems.push(Problem::new(format!("{} knows no coordinator", view.seen_from)));
+    }
+    problems
+}
+
+/// Why a component does not do its work, when it does not.
+fn trouble(component: &ComponentView, view: &StatusView) -> Option<Problem> {
+    let name = &component.name;
+    let Some(home) = &component.home else {
+        let mut problem = Problem::new(format!("{name} has no home: {}", component.reason));
+        let refusals = component.refusals.iter();
+        problem.details = refusals.map(|refusal| one_line(&refusal.to_string())).collect();
+        return Some(problem);
+    };
+    if view.robots.iter().any(|robot| robot.name == *home && !robot.alive) {
+        return Some(Problem::new(format!("{name} was on {home}, which is quiet")));
+    }
+    let reason = &component.reason;
+    match component.state {
+        Some(LifecycleState::Active) => None,
+        Some(state) => Some(Problem::new(format!("{name} is {state} on {home} ({reason})"))),
+        None => Some(Problem::new(format!("{name} does not run yet on {home} ({reason})"))),
+    }
+}
+
+/// Connections between active components that carry nothing.
+fn silent_connections(system: &SystemView) -> impl Iterator<Item = Problem> {
+    let active = |end: &str| {
+        let name = end.split('.').next().unwrap_or(end).trim();
+        system.components.iter().any(|component| component.name == name && is_active(component))
+    };
+    let silent = system.connections.iter().filter(move |connection| {
+        !connection.heard && connection.name.split("->").all(|end| active(end.trim()))
+    });
+    silent.map(|connection| {
+        Problem::new(format!("{}: both ends are active, no sample arrived yet", connection.name))
+    })
+}
+
+/// Whether the instance at home does its work.
+pub(crate) fn is_active(component: &ComponentView) -> bool {
+    component.home.is_some() && component.state == Some(LifecycleState::Active)
+}
+
+fn head(view: &StatusView) -> String {
+    let role = match &view.coordinator {
+        Some(robot) if *robot == view.seen_from => format!("coordinator, term {}", view.term),
+        Some(robot) => format!("coordinator {robot}, term {}", view.term),
+        None => "no coordinator known".into(),
+    };
+    format!(
+        "{}, {}      seen from {}, {role}",
+        count(view.robots.len(), "robot"),
+        count(view.systems.len(), "system"),
+        view.seen_from
+    )
+}
+
+fn robots(view: &StatusView) -> Table<8> {
+    let head = ["ROBOT", "SEEN", "CPU", "FREE MEM", "BATTERY", "RSSI", "ROLE", "NOTE"];
+    let mut table = Table::new(head);
+    for robot in &view.robots {
+        let faint = robot.conditions.iter().any(|condition| condition.contains("rssi"));
+        let seen = match (robot.name == view.seen_from, robot.alive) {
+            (true, _) => "here".into(),
+            (false, true) => span(robot.seen_ms),
+            (false, false) => format!("{} !", span(robot.seen_ms)),
+        };
+        table.row([
+            robot.name.clone(),
+            seen,
+            format!("{:>5}", percent(robot.cpu_permille)),
+            format!("{:>8}", megabytes(robot.memory_free_bytes)),
+            battery(robot),
+            format!("{}{}", level(robot.rssi_dbm), if faint { " !" } else { "" }),
+            if robot.coordinator { "coordinator".into() } else { NOTHING.into() },
+            note(robot),
+        ]);
+    }
+    table
+}
+
+fn battery(robot: &RobotView) -> String {
+    robot.battery_permille.map_or_else(|| NOTHING.into(), percent)
+}
+
+fn note(robot: &RobotView) -> String {
+    one_line(&robot.conditions.join("; "))
+}
+
+fn system_head(system: &SystemView) -> String {
+    let active = system.components.iter().filter(|component| is_active(component)).count();
+    let heard = system.connections.iter().filter(|connection| connection.heard).count();
+    format!(
+        "SYSTEM {}   revision {}   {active} of {} active   {heard} of {} connections heard",
+        system.name,
+        system.revision,
+        system.components.len(),
+        system.connections.len()
+    )
+}
+
+fn components(system: &SystemView) -> Table<7> {
+    let mut table = Table::new(["COMPONENT", "HOME", "STATE", "EPOCH", "RUN", "MEMORY", "NOTE"]);
+    for component in &system.components {
+        table.row([
+            component.name.clone(),
+            component.home.clone().unwrap_or_else(|| NOTHING.into()),
+            component.state.map_or_else(|| NOTHING.into(), |state| state.to_string()),
+            component.epoch.to_string(),
+            component.run.to_string(),
+            format!("{:>7}", megabytes(component.memory_bytes)),
+            component_note(component),
+        ]);
+    }
+    table
+}
+
+fn component_note(component: &ComponentView) -> String {
+    let mut parts = Vec::new();
+    if component.restarts > 0 {
+        parts.push(count(usize::try_from(component.restarts).unwrap_or(usize::MAX), "restart"));
+    }
+    if !component.standbys.is_empty() {
+        parts.push(format!("also on {}", component.standbys.join(", ")));
+    }
+    let reason = one_line(&component.reason);
+    if !reason.is_empty() {
+        parts.push(reason);
+    }
+    parts.join("; ")
+}
+
+/// Causes that hold on the answering robot, each with how long it must hold.
+fn conditions(view: &StatusView, columns: usize) -> Vec<String> {
+    let mut lines = Vec::new();
+    for condition in &view.conditions {
+        let stand = match condition.raised {
+            true => format!("raised after {}", span(condition.hold_ms)),
+            false => format!("held {} of {}", span(condition.held_ms), span(condition.hold_ms)),
+        };
+        let line = format!(
+            "{} on {} for {}: {stand} ({})",
+            condition.cause,
+            view.seen_from,
+            condition.component,
+            one_line(&condition.reason)
+        );
+        lines.extend(wrap(&line, columns, "  "));
+    }
+    if !lines.is_empty() {
+        lines.insert(0, String::new());
+    }
+    lines
+}
+
+fn next_step(view: &StatusView) -> Vec<String> {
+    let next = match view.systems.is_empty() {
+        true => "Nothing is deployed.    next: sdr deploy systems/exploration.yaml --wait",
+        false => "why: sdr events -n 20",
+    };
+    vec![String::new(), next.into()]
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,85 @@
+//! Golden screens.
+
+use super::*;
+use crate::render::fixture;
+
+fn text(view: &StatusView) -> String {
+    let lines = screen(view, 80);
+    for line in &lines {
+        assert!(line.chars().count() <= 80, "{} columns: {line}", line.chars().count());
+    }
+    lines.join("\n")
+}
+
+#[test]
+fn a_fleet_that_is_well_is_shown_in_eighty_columns() {
+    let golden = "\
+3 robots, 1 system      seen from robot-2, coordinator, term 1
+
+ROBOT    SEEN   CPU    FREE MEM  BATTERY  RSSI     ROLE         NOTE
+robot-1  0.3 s   38 %  1898 MB   81 %     -55.0 !  -            rssi-low 14 s
+robot-2  here    38 %   841 MB   81 %     -47.1    coordinator
+robot-3  0.3 s   38 %   312 MB   81 %     -46.8    -
+
+SYSTEM exploration   revision 1   5 of 5 active   5 of 5 connections heard
+COMPONENT   HOME     STATE   EPOCH  RUN  MEMORY   NOTE
+fisheye     robot-3  active  2      1     530 MB  moved from robot-1: rssi-low
+anomaly     robot-3  active  2      1     530 MB  moved from robot-1: rssi-low
+camera      robot-2  active  1      1     530 MB  robot-1: memory_free 310 MB...
+controller  robot-2  active  1      1     530 MB  robot-1: memory_free 310 MB...
+position    robot-3  active  1      1     530 MB  robot-2: memory_free 310 MB...
+
+why: sdr events -n 20";
+    let view = fixture::fleet();
+    assert_eq!(text(&view), golden);
+    assert_eq!(problems(&view), []);
+}
+
+#[test]
+fn what_is_wrong_stands_first_with_numbers_and_bars() {
+    let mut view = fixture::fleet();
+    fixture::make_homeless(&mut view.systems[0].components[4]);
+    view.systems[0].components[2].state = Some(LifecycleState::Error);
+    view.robots[0].alive = false;
+    view.robots[0].seen_ms = 12_000;
+    view.robots[0].battery_permille = Some(90);
+
+    let golden = "\
+! camera is error on robot-2 (robot-1: memory_free 310 MB, bar 500 MB)
+! position has no home: no robot fits
+    robot-1: memory_free 310 MB, bar 500 MB
+    robot-2: memory_free 310 MB, bar 500 MB
+! robot-1 is quiet for 12 s (last: battery 9 %, 1898 MB free)
+";
+    let screen = text(&view);
+    assert!(screen.starts_with(golden), "{screen}");
+}
+
+#[test]
+fn a_silent_connection_is_wrong_only_when_both_ends_are_active() {
+    let mut view = fixture::fleet();
+    view.systems[0].connections[0].heard = false;
+    let found = problems(&view);
+    assert_eq!(found.len(), 1);
+    assert!(found[0].text.starts_with("fisheye.image -> anomaly.image: "), "{found:?}");
+
+    view.systems[0].components[0].state = Some(LifecycleState::Inactive);
+    let found = problems(&view);
+    assert_eq!(found.len(), 1);
+    assert!(found[0].text.starts_with("fisheye is inactive on robot-3"), "{found:?}");
+}
+
+#[test]
+fn an_empty_fleet_says_what_to_do_next() {
+    let mut view = fixture::fleet();
+    view.systems.clear();
+    assert!(text(&view).ends_with("next: sdr deploy systems/exploration.yaml --wait"));
+}
+
+#[test]
+fn a_component_on_a_quiet_robot_is_wrong_though_its_last_word_was_active() {
+    let mut view = fixture::fleet();
+    view.robots[2].alive = false;
+    let texts: Vec<String> = problems(&view).into_iter().map(|problem| problem.text).collect();
+    assert!(texts.contains(&"fisheye was on robot-3, which is quiet".to_owned()), "{texts:?}");
+}
