@@ -1,0 +1,178 @@
+//! Over real shared memory, in a place of their own.
+
+use std::os::fd::AsFd;
+use std::path::PathBuf;
+
+use rustix::event::{PollFd, PollFlags, poll};
+use sdr_core::{
+    id::RobotId,
+    order::{Epoch, Token},
+};
+
+use super::*;
+
+/// A robot of its own for each test; everything is gone afterwards.
+struct Place {
+    memory: SharedMemory,
+    _folder: tempfile::TempDir,
+}
+
+fn place() -> Place {
+    let folder = tempfile::tempdir_in("/dev/shm").unwrap();
+    let word = folder.path().file_name().unwrap().to_str().unwrap().replace(".tmp", "");
+    let prefix = format!("t{word}_");
+    Place { memory: SharedMemory { prefix, root: folder.path().to_owned() }, _folder: folder }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        for entry in std::fs::read_dir("/dev/shm").unwrap().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(&self.memory.prefix) {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+}
+
+fn token() -> Token {
+    Token { epoch: Epoch::first(&RobotId::new("robot-1").unwrap()), run: 1 }
+}
+
+fn send(publisher: &Publisher, sequence: u64, bytes: &[u8]) -> usize {
+    let mut loan = publisher.loan(bytes.len()).unwrap();
+    loan.payload_mut().copy_from_slice(bytes);
+    loan.send(SampleHeader { sequence, ..SampleHeader::new(&token()) }).unwrap()
+}
+
+fn is_readable(subscriber: &Subscriber) -> bool {
+    let fd = subscriber.as_fd();
+    let limit = rustix::event::Timespec { tv_sec: 0, tv_nsec: 0 };
+    poll(&mut [PollFd::new(&fd, PollFlags::IN)], Some(&limit)).unwrap() == 1
+}
+
+#[test]
+fn what_is_sent_arrives_in_order_with_its_header_and_wakes_the_reader() {
+    let place = place();
+    let memory = Memory::open(&place.memory, "test").unwrap();
+    let subscriber = memory.subscriber("s/c/p", 8).unwrap();
+    let publisher = memory.publisher("s/c/p", 8, 16).unwrap();
+    subscriber.clear_wakes();
+    assert!(!is_readable(&subscriber));
+
+    assert_eq!(send(&publisher, 1, b"one"), 1);
+    send(&publisher, 2, &vec![7; 100_000]);
+
+    assert!(is_readable(&subscriber));
+    subscriber.clear_wakes();
+    assert!(!is_readable(&subscriber));
+    let first = subscriber.receive().unwrap().unwrap();
+    assert_eq!((first.payload(), first.header().sequence), (b"one".as_slice(), 1));
+    assert_eq!(first.header().token(), Some(token()));
+    assert_eq!(subscriber.receive().unwrap().unwrap().payload(), vec![7; 100_000]);
+    assert!(subscriber.receive().unwrap().is_none());
+}
+
+#[test]
+fn a_slow_reader_loses_its_oldest_samples() {
+    let place = place();
+    let memory = Memory::open(&place.memory, "test").unwrap();
+    let publisher = memory.publisher("s/c/p", 8, 16).unwrap();
+    let subscriber = memory.subscriber("s/c/p", 2).unwrap();
+
+    for sequence in 1..=5 {
+        send(&publisher, sequence, b"x");
+    }
+
+    let mut seen = Vec::new();
+    while let Some(sample) = subscriber.receive().unwrap() {
+        seen.push(sample.header().sequence);
+    }
+    assert_eq!(seen, [4, 5]);
+}
+
+#[test]
+fn a_full_queue_may_be_held_while_more_arrives() {
+    let place = place();
+    let memory = Memory::open(&place.memory, "test").unwrap();
+    let publisher = memory.publisher("s/c/p", 64, 16).unwrap();
+    let subscriber = memory.subscriber("s/c/p", 64).unwrap();
+
+    let mut held = Vec::new();
+    for sequence in 0..68 {
+        send(&publisher, sequence, b"x");
+        held.push(subscriber.receive().unwrap().unwrap());
+    }
+
+    assert_eq!(held.len(), 68);
+}
+
+#[test]
+fn those_who_open_a_port_with_other_depths_get_the_first_one_s_class() {
+    let place = place();
+    let memory = Memory::open(&place.memory, "test").unwrap();
+    let publisher = memory.publisher("s/c/p", 8, 16).unwrap();
+    let subscriber = memory.subscriber("s/c/p", 64).unwrap();
+
+    for sequence in 1..=20 {
+        send(&publisher, sequence, b"x");
+    }
+
+    assert_eq!(subscriber.receive().unwrap().unwrap().header().sequence, 5);
+}
+
+#[test]
+fn two_robots_on_one_machine_do_not_hear_each_other() {
+    let (here, there) = (place(), place());
+    let mine = Memory::open(&here.memory, "test").unwrap();
+    let theirs = Memory::open(&there.memory, "test").unwrap();
+    let subscriber = mine.subscriber("s/c/p", 2).unwrap();
+    let publisher = theirs.publisher("s/c/p", 8, 16).unwrap();
+
+    assert_eq!(send(&publisher, 1, b"x"), 0);
+    assert!(subscriber.receive().unwrap().is_none());
+}
+
+#[test]
+fn a_sample_over_the_bound_is_refused_with_the_number() {
+    let place = place();
+    let memory = Memory::open(&place.memory, "test").unwrap();
+    let publisher = memory.publisher("s/c/p", 8, 16).unwrap();
+
+    let error = publisher.loan(PAYLOAD_BYTES_MAX + 1).unwrap_err().to_string();
+
+    assert!(error.contains("67108865 bytes") && error.contains("67108864"), "{error}");
+}
+
+#[test]
+fn a_place_that_cannot_work_is_refused_before_anything_is_made() {
+    let root = PathBuf::from("/dev/shm/").join("x".repeat(60));
+    let long = SharedMemory { prefix: String::from("a_"), root: root.clone() };
+    assert!(matches!(Memory::open(&long, "t"), Err(ShmError::RootTooLong { .. })));
+    assert!(!root.exists());
+    let wide = SharedMemory { prefix: "p".repeat(13), root: PathBuf::from("/dev/shm/x") };
+    assert!(matches!(Memory::open(&wide, "t"), Err(ShmError::PrefixTooLong { .. })));
+}
+
+/// What a port costs with these limits; run by hand: `cargo test -- --ignored --nocapture cost`.
+#[test]
+#[ignore = "a measurement, not a claim"]
+fn cost_of_a_port() {
+    let place = place();
+    let memory = Memory::open(&place.memory, "test").unwrap();
+    let rss = || {
+        let text = std::fs::read_to_string("/proc/self/status").unwrap();
+        text.lines().filter(|line| line.starts_with("Rss")).collect::<Vec<_>>().join(" ")
+    };
+    println!("before {}", rss());
+    let start = std::time::Instant::now();
+    let mut ports = Vec::new();
+    for index in 0..20 {
+        let path = format!("s/c/p{index}");
+        ports.push((memory.publisher(&path, 8, 64).unwrap(), memory.subscriber(&path, 8).unwrap()));
+    }
+    println!("20 pairs in {:?}; {}", start.elapsed(), rss());
+    for (publisher, _) in &ports {
+        send(publisher, 1, &[0; 60_000]);
+    }
+    println!("each sent 60 kB: {}", rss());
+}
