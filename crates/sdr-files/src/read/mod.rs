@@ -1,0 +1,135 @@
+//! From the tree to typed files: every key known, every problem told.
+
+mod table;
+mod values;
+
+use std::net::SocketAddr;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+
+pub(crate) use table::{Keys, table};
+pub(crate) use values::{At, Map, OneOrMany};
+
+use crate::{
+    near::allowed_words,
+    problem::{Mark, Problem, Source},
+    tree::{Body, Node},
+};
+
+/// A type that a node of a file can be read into.
+pub(crate) trait Read: Sized {
+    /// The value of `node`, or `None` after telling `reader` every problem.
+    fn read(node: &Node, reader: &mut Reader) -> Option<Self>;
+
+    /// The value when its key is missing; `None` for keys that must be there.
+    fn absent() -> Option<Self> {
+        None
+    }
+
+    /// What may stand there, as JSON schema.
+    fn schema(generator: &mut SchemaGenerator) -> Schema;
+}
+
+/// Collects the problems of one file.
+#[derive(Debug)]
+pub(crate) struct Reader {
+    source: Source,
+    problems: Vec<Problem>,
+}
+
+impl Reader {
+    pub(crate) fn new(source: Source) -> Self {
+        Self { source, problems: Vec::new() }
+    }
+
+    /// Tells a problem at `mark`.
+    pub(crate) fn problem(&mut self, mark: Mark, message: impl Into<String>, help: Option<String>) {
+        let problem = self.source.problem(mark, message.into(), help);
+        self.problems.push(problem);
+    }
+
+    /// Tells that `node` is not what is allowed here.
+    pub(crate) fn wrong(&mut self, node: &Node, allowed: &str) {
+        let message = match node.body {
+            Body::Nothing => String::from("nothing stands here"),
+            Body::Bool(_)
+            | Body::Int(_)
+            | Body::Float(_)
+            | Body::Text(_)
+            | Body::List(_)
+            | Body::Table(_) => format!("found {}", node.found()),
+        };
+        self.problem(node.mark, message, Some(format!("allowed: {allowed}")));
+    }
+
+    /// Tells that `word` is none of `allowed`.
+    pub(crate) fn unknown(&mut self, mark: Mark, what: &str, word: &str, allowed: &[&str]) {
+        self.problem(mark, format!("unknown {what} `{word}`"), Some(allowed_words(word, allowed)));
+    }
+
+    /// Tells that something is designed but not built yet.
+    pub(crate) fn later(&mut self, mark: Mark, word: &str, what: &str) {
+        let message = format!("`{word}` ({what}) is not in this version");
+        self.problem(mark, message, Some(String::from("take it out")));
+    }
+
+    pub(crate) fn source(&self) -> &Source {
+        &self.source
+    }
+
+    pub(crate) fn is_clean(&self) -> bool {
+        self.problems.is_empty()
+    }
+
+    pub(crate) fn into_problems(self) -> Vec<Problem> {
+        self.problems
+    }
+
+    /// The text of `node`.
+    pub(crate) fn text<'n>(&mut self, node: &'n Node, allowed: &str) -> Option<&'n str> {
+        match &node.body {
+            Body::Text(text) => Some(text),
+            Body::Nothing
+            | Body::Bool(_)
+            | Body::Int(_)
+            | Body::Float(_)
+            | Body::List(_)
+            | Body::Table(_) => {
+                self.wrong(node, allowed);
+                None
+            }
+        }
+    }
+
+    /// One word out of `words`, by its index; `later` are words of later versions.
+    pub(crate) fn choice(
+        &mut self,
+        node: &Node,
+        words: &[&str],
+        later: &[(&str, &str)],
+    ) -> Option<usize> {
+        let word = self.text(node, &words.join(", "))?;
+        if let Some((_, what)) = later.iter().find(|(other, _)| *other == word) {
+            self.later(node.mark, word, what);
+            return None;
+        }
+        let index = words.iter().position(|other| *other == word);
+        if index.is_none() {
+            self.unknown(node.mark, "word", word, words);
+        }
+        index
+    }
+}
+
+/// An address with a port; without one, `port_default`.
+pub(crate) fn address(text: &str, port_default: u16) -> Option<SocketAddr> {
+    match text.parse::<SocketAddr>() {
+        Ok(address) => Some(address),
+        Err(_) => text.parse().ok().map(|ip| SocketAddr::new(ip, port_default)),
+    }
+}
+
+/// The schema of a type read by this module, for derived schemas around it.
+pub(crate) fn nested<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
+    generator.subschema_for::<T>()
+}

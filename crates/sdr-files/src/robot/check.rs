@@ -1,0 +1,303 @@
+//! From robot.toml as written to the checked configuration.
+
+use std::{net::SocketAddr, path::PathBuf, time::Duration};
+
+use sdr_core::{
+    id::{Name, NameError, RobotId},
+    report::RolePreference,
+    spec::PortRef,
+    units::Bytes,
+};
+
+use super::{
+    config::{
+        ApiConfig, CapacityConfig, ComponentsConfig, DeviceConfig, LogConfig, LogFormat,
+        LogsConfig, MeshConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig,
+        RosConfig, SensorsConfig, StorageConfig, SystemPort,
+    },
+    file::{
+        CapacityTable, Devices, LogTable, MeshTable, RadioTable, RecordingsEntry, RobotFile,
+        RobotTable, SensorsTable, StorageTable,
+    },
+    places::Places,
+    sources::{BatterySource, PositionSource, RssiEntry, RssiSource, SensorEntry},
+};
+use crate::{
+    problem::Mark,
+    read::{At, Reader, address},
+};
+
+/// The mesh's UDP port when none is given.
+const MESH_PORT: u16 = 7600;
+/// Highest DDS domain whose ports are below 65536.
+const DOMAIN_MAX: u16 = 232;
+
+/// The checked configuration; every problem is told to `reader`.
+pub(super) fn checked(
+    file: RobotFile,
+    places: &Places,
+    reader: &mut Reader,
+) -> Option<RobotConfig> {
+    let mesh = mesh(file.mesh, reader);
+    let (name, labels, devices) = body(file.robot, places, reader);
+    let ros = file.ros.and_then(|table| table.domain_id);
+    let components = file.components;
+    let on_agent_death = components.as_ref().and_then(|table| table.on_agent_death.as_ref());
+    let preference = file.coordinator.and_then(|table| table.preference);
+    let socket = file.api.and_then(|table| table.socket);
+    let config = RobotConfig {
+        name: name?,
+        labels,
+        devices,
+        capacity: capacity(file.capacity, reader),
+        mesh: mesh?,
+        radio: radio(file.radio, places, reader),
+        sensors: file.sensors.map(|table| sensors(table, places, reader)).unwrap_or_default(),
+        ros: RosConfig { domain_id: ros.map_or(0, |domain| domain_id(&domain, reader)) },
+        coordinator: preference.map_or(RolePreference::Able, |preference| preference.value),
+        components: ComponentsConfig {
+            on_agent_death: on_agent_death.map_or(OnAgentDeath::Keep, |at| at.value),
+            path: components
+                .and_then(|table| table.path)
+                .map(|paths| paths.value.iter().map(|p| places.resolve(&p.value)).collect())
+                .unwrap_or_default(),
+        },
+        api: ApiConfig { socket: path_or(socket, places, || places.run.join("agent.sock")) },
+        storage: storage(file.storage, places, reader),
+        log: log(file.log, reader),
+    };
+    reader.is_clean().then_some(config)
+}
+
+fn path_or(
+    given: Option<At<String>>,
+    places: &Places,
+    default: impl FnOnce() -> PathBuf,
+) -> PathBuf {
+    given.map_or_else(default, |path| places.resolve(&path.value))
+}
+
+fn body(
+    table: Option<RobotTable>,
+    places: &Places,
+    reader: &mut Reader,
+) -> (Option<RobotId>, Vec<String>, Vec<DeviceConfig>) {
+    let (name, labels, devices) =
+        table.map_or((None, None, None), |table| (table.name, table.labels, table.devices));
+    let name = match name {
+        Some(name) => Some(name.value),
+        None if !reader.is_clean() => None,
+        None => RobotId::new(&places.host_name)
+            .map_err(|error| {
+                let message = format!("the host's name is no robot's name: {error}");
+                let help = String::from("give [robot] a `name`");
+                reader.problem(Mark::FILE, message, Some(help));
+            })
+            .ok(),
+    };
+    let labels = labels.map(|labels| labels.value).unwrap_or_default();
+    (name, labels, devices.map(|list| self::devices(list, places, reader)).unwrap_or_default())
+}
+
+fn devices(list: At<Devices>, places: &Places, reader: &mut Reader) -> Vec<DeviceConfig> {
+    match list.value {
+        Devices::Names(names) => {
+            names.into_iter().map(|name| DeviceConfig { name: name.value, path: None }).collect()
+        }
+        Devices::Files(entries) => entries
+            .0
+            .into_iter()
+            .filter_map(|(key, path)| {
+                let name = Name::new(&key.value)
+                    .map_err(|error| reader.problem(key.mark, error.to_string(), None))
+                    .ok()?;
+                Some(DeviceConfig { name, path: Some(places.resolve(&path?)) })
+            })
+            .collect(),
+    }
+}
+
+fn capacity(table: Option<CapacityTable>, reader: &mut Reader) -> CapacityConfig {
+    let (memory, cpu, reserve) =
+        table.map_or((None, None, None), |t| (t.memory, t.cpu, t.reserve_memory));
+    let mut more_than_none = |mark: Mark, none: bool| {
+        if none {
+            reader.problem(
+                mark,
+                "a capacity of nothing",
+                Some(String::from("allowed: more than 0")),
+            );
+        }
+    };
+    if let Some(memory) = &memory {
+        more_than_none(memory.mark, memory.value.0 == 0);
+    }
+    if let Some(cpu) = &cpu {
+        more_than_none(cpu.mark, cpu.value.0 == 0);
+    }
+    CapacityConfig {
+        memory: memory.map(|at| at.value),
+        cpu: cpu.map(|at| at.value),
+        reserve_memory: reserve.map_or(Bytes::mega(150), |at| at.value),
+    }
+}
+
+fn mesh(table: MeshTable, reader: &mut Reader) -> Option<MeshConfig> {
+    let unsealed = table.unsealed.as_ref().is_some_and(|unsealed| unsealed.value);
+    if !unsealed {
+        let mark = match (&table.keys, &table.unsealed) {
+            (Some(keys), _) => keys.mark,
+            (None, Some(flag)) => flag.mark,
+            (None, None) => Mark::FILE,
+        };
+        let help = "allowed for now: `unsealed = true`, on loopback addresses only";
+        let message = "a sealed mesh (with keys) is not in this version";
+        reader.problem(mark, message, Some(help.to_owned()));
+    }
+    let listen = match table.listen {
+        Some(listen) => loopback(&listen, reader),
+        None => Some(SocketAddr::from(([127, 0, 0, 1], MESH_PORT))),
+    };
+    let seeds = table.seeds.map(|seeds| seeds.value).unwrap_or_default();
+    let seeds: Vec<SocketAddr> = seeds.iter().filter_map(|seed| loopback(seed, reader)).collect();
+    let mut within = |given: Option<At<Duration>>, default, range| {
+        given.map_or(default, |at| bounded(&at, range, reader))
+    };
+    let gossip_period = within(table.gossip_period, Duration::from_millis(250), (20, 10_000));
+    let gone_mark = table.gone_after.as_ref().map(|at| at.mark);
+    let gone_after = within(table.gone_after, Duration::from_secs(10), (100, 600_000));
+    let rejoin_wait = within(table.rejoin_wait, Duration::from_secs(2), (0, 60_000));
+    if gone_after < gossip_period * 3 {
+        let message = format!("gone_after {gone_after:?} is less than 3 rounds of gossip");
+        let help = format!("allowed: {:?} or more", gossip_period * 3);
+        reader.problem(gone_mark.unwrap_or(Mark::FILE), message, Some(help));
+    }
+    Some(MeshConfig {
+        fleet: table.fleet.map_or_else(|| String::from("fleet"), |fleet| fleet.value.to_string()),
+        unsealed,
+        listen: listen?,
+        seeds,
+        gossip_period,
+        gone_after,
+        rejoin_wait,
+    })
+}
+
+/// An address on loopback, where alone plain datagrams are allowed.
+fn loopback(at: &At<String>, reader: &mut Reader) -> Option<SocketAddr> {
+    let Some(address) = address(&at.value, MESH_PORT) else {
+        let message = format!("`{}` is no IP address with port", at.value);
+        let help = String::from("allowed: such as 127.0.0.1:7600 or [::1]:7600");
+        reader.problem(at.mark, message, Some(help));
+        return None;
+    };
+    if !address.ip().is_loopback() {
+        let message = format!("`{}` is not loopback, and this mesh is not sealed", at.value);
+        let help = String::from("allowed: 127.0.0.0/8 and ::1");
+        reader.problem(at.mark, message, Some(help));
+        return None;
+    }
+    Some(address)
+}
+
+/// A time within `range`, in milliseconds, both ends allowed.
+fn bounded(at: &At<Duration>, range: (u64, u64), reader: &mut Reader) -> Duration {
+    let (least, most) = (Duration::from_millis(range.0), Duration::from_millis(range.1));
+    if at.value < least || at.value > most {
+        let message = format!("{:?} is out of range", at.value);
+        reader.problem(at.mark, message, Some(format!("allowed: {least:?} to {most:?}")));
+    }
+    at.value
+}
+
+fn radio(table: Option<RadioTable>, places: &Places, reader: &mut Reader) -> RadioConfig {
+    let (interface, rssi, period) =
+        table.map_or((None, None, None), |t| (t.interface, t.rssi, t.period));
+    RadioConfig {
+        interface: interface.map(|at| at.value),
+        rssi: match rssi.map(|at| at.value) {
+            Some(RssiEntry::File(path)) => RssiSource::File(places.resolve(&path)),
+            Some(RssiEntry::Auto) | None => RssiSource::Auto,
+        },
+        period: period.map_or(Duration::from_millis(100), |at| bounded(&at, (10, 10_000), reader)),
+    }
+}
+
+fn sensors(table: SensorsTable, places: &Places, reader: &mut Reader) -> SensorsConfig {
+    let battery = table.battery.and_then(|at| match at.value.0 {
+        SensorEntry::PowerSupply(name) => Some(BatterySource::PowerSupply(name)),
+        SensorEntry::File(path) => Some(BatterySource::File(places.resolve(&path))),
+        SensorEntry::Port(port) => system_port(&port, reader).map(BatterySource::Port),
+    });
+    let position = table.position.and_then(|at| match at.value.0 {
+        SensorEntry::File(path) => Some(PositionSource::File(places.resolve(&path))),
+        SensorEntry::Port(port) => system_port(&port, reader).map(PositionSource::Port),
+        SensorEntry::PowerSupply(_) => None,
+    });
+    SensorsConfig { battery, position }
+}
+
+/// `exploration.position.odometry`.
+fn system_port(at: &At<String>, reader: &mut Reader) -> Option<SystemPort> {
+    let words: Vec<&str> = at.value.split('.').collect();
+    let [system, component, port] = words.as_slice() else {
+        let message = format!("`{}` is no port of a system", at.value);
+        let help = String::from("allowed: system.component.port");
+        reader.problem(at.mark, message, Some(help));
+        return None;
+    };
+    let made = || -> Result<SystemPort, NameError> {
+        let port = PortRef { component: Name::new(component)?, port: Name::new(port)? };
+        Ok(SystemPort { system: Name::new(system)?, port })
+    };
+    made().map_err(|error| reader.problem(at.mark, error.to_string(), None)).ok()
+}
+
+fn domain_id(domain: &At<u16>, reader: &mut Reader) -> u16 {
+    if domain.value > DOMAIN_MAX {
+        let message = format!("DDS has no domain {}", domain.value);
+        reader.problem(domain.mark, message, Some(format!("allowed: 0 to {DOMAIN_MAX}")));
+    }
+    domain.value
+}
+
+fn storage(table: Option<StorageTable>, places: &Places, reader: &mut Reader) -> StorageConfig {
+    let (state, recordings, logs) =
+        table.map_or((None, None, None), |t| (t.state, t.recordings, t.logs));
+    let state = path_or(state, places, || places.state.clone());
+    let recordings = match recordings {
+        Some(RecordingsEntry::Off) => None,
+        Some(RecordingsEntry::On(table)) => Some((table.dir, table.max, table.ports)),
+        None => Some((None, None, None)),
+    };
+    let recordings = recordings.map(|(dir, max, ports)| RecordingsConfig {
+        dir: path_or(dir, places, || state.join("recordings")),
+        max: max.map_or(Bytes::mega(2000), |at| at.value),
+        ports: ports
+            .map(|ports| ports.value.iter().filter_map(|at| system_port(at, reader)).collect())
+            .unwrap_or_default(),
+    });
+    let (dir, max, each) = logs.map_or((None, None, None), |t| (t.dir, t.max, t.each));
+    let logs = LogsConfig {
+        dir: path_or(dir, places, || state.join("logs")),
+        max: max.map_or(Bytes::mega(50), |at| at.value),
+        each: each.map_or(Bytes::mega(5), |at| at.value),
+    };
+    StorageConfig { state, recordings, logs }
+}
+
+fn log(table: Option<LogTable>, reader: &mut Reader) -> LogConfig {
+    const LEVELS: &[&str] = &["error", "warn", "info", "debug", "trace"];
+    let (level, format) = table.map_or((None, None), |table| (table.level, table.format));
+    if let Some(level) = &level {
+        let first = level.value.split([',', '=']).next().unwrap_or_default();
+        let plain = !level.value.contains(['=', ',']);
+        if plain && !LEVELS.contains(&first) {
+            reader.unknown(level.mark, "level", first, LEVELS);
+        }
+    }
+    LogConfig {
+        level: level.map_or_else(|| String::from("info"), |level| level.value),
+        format: format.map_or(LogFormat::Text, |format| format.value),
+    }
+}
