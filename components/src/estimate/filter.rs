@@ -7,8 +7,8 @@ use super::odometer::{Motion, moved};
 
 /// Squared Mahalanobis distance beyond which a bearing is not believed: 1 in 400 true ones.
 const GATE: f64 = 9.0;
-/// After so many refusals in a row the estimate, not the bearings, is in doubt.
-const REFUSALS_MAX: u32 = 12;
+/// So many refusals more than half the acceptances put the estimate, not the bearings, in doubt.
+const DOUBT_MAX: f64 = 12.0;
 /// Longest age of a bearing, seconds; older ones are of no use.
 const AGE_MAX_S: f64 = 1.0;
 
@@ -63,7 +63,7 @@ pub struct Estimator {
     pose: Pose,
     covariance: Matrix,
     motion: Motion,
-    refusals: u32,
+    doubt: f64,
     accepted: u64,
     refused: u64,
 }
@@ -76,7 +76,7 @@ impl Estimator {
         covariance[1][1] = spread.y.powi(2);
         covariance[2][2] = spread.yaw.powi(2);
         let motion = Motion::default();
-        Self { pose, covariance, motion, refusals: 0, accepted: 0, refused: 0 }
+        Self { pose, covariance, motion, doubt: 0.0, accepted: 0, refused: 0 }
     }
 
     /// Moves the estimate; a motion that is not finite is left out.
@@ -107,7 +107,11 @@ impl Estimator {
     /// Corrects the estimate by a bearing, if it is believable.
     pub fn correct(&mut self, seen: &Observation) -> Correction {
         let finite = [seen.x, seen.y, seen.bearing].iter().all(|value| value.is_finite());
-        if !finite || !(seen.sigma > 0.0) || !(0.0..=AGE_MAX_S).contains(&seen.age_s) {
+        if !finite
+            || seen.sigma.is_nan()
+            || seen.sigma <= 0.0
+            || !(0.0..=AGE_MAX_S).contains(&seen.age_s)
+        {
             return Correction::Senseless;
         }
         let back = Motion { seconds: -seen.age_s, ..self.motion };
@@ -123,7 +127,7 @@ impl Estimator {
             self.count_refusal();
             return Correction::Refused { distance };
         }
-        self.refusals = 0;
+        self.doubt = (self.doubt - 0.5).max(0.0);
         self.accepted += 1;
         let gain = spread.map(|value| value / variance);
         self.pose = Pose::new(
@@ -173,13 +177,13 @@ impl Estimator {
         }
     }
 
-    /// A run of refusals widens the estimate until bearings are believed again.
+    /// Doubt widens the estimate until bearings are believed again.
     fn count_refusal(&mut self) {
         self.refused += 1;
-        self.refusals += 1;
-        if self.refusals >= REFUSALS_MAX {
-            self.refusals = 0;
-            let widen = |variance: f64, most: f64| (variance * 4.0).clamp(most / 100.0, most);
+        self.doubt += 1.0;
+        if self.doubt >= DOUBT_MAX {
+            self.doubt = 0.0;
+            let widen = |variance: f64, most: f64| (variance * 4.0).clamp(most / 10.0, most);
             let [x, y, yaw] =
                 [(0, 25.0), (1, 1.0), (2, 1.0)].map(|(i, most)| widen(self.covariance[i][i], most));
             self.covariance = [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, yaw]];

@@ -62,7 +62,8 @@ impl Odometer {
         let seconds = elapsed_ns as f64 / 1e9;
         let left = (reading.left_m - last.left_m) / seconds;
         let right = (reading.right_m - last.right_m) / seconds;
-        if !reading.gyro_rad_s.is_finite() || !(left.abs() + right.abs() < WHEEL_MAX_M_S) {
+        let fastest = left.abs() + right.abs();
+        if !reading.gyro_rad_s.is_finite() || fastest.is_nan() || fastest > WHEEL_MAX_M_S {
             return None;
         }
         if left.abs().max(right.abs()) < STANDING_M_S {

@@ -31,7 +31,7 @@ impl Balance {
             pixels += 1;
             let [r, g, b] = pixel.map(f32::from);
             let (high, low) = (r.max(g).max(b), r.min(g).min(b));
-            if high >= DARK && high < 250.0 && (high - low) < GREY * high {
+            if (DARK..250.0).contains(&high) && (high - low) < GREY * high {
                 greys += 1;
                 // Chromaticity, so that bright walls do not outvote dark ones.
                 let sum = r + g + b;
@@ -114,9 +114,8 @@ mod tests {
     #[test]
     fn landmarks_have_their_own_paint() {
         for colour in Colour::ALL {
-            let bright = colour.albedo().map(|share| share * 200.0);
-            let pixel = bright.map(|value| u8::try_from(value.round() as i64).unwrap());
-            assert_eq!(paint(pixel), Some(Paint::Landmark(colour)));
+            let on = |share: f32| if share > 0.5 { 190 } else { 15 };
+            assert_eq!(paint(colour.albedo().map(on)), Some(Paint::Landmark(colour)));
         }
     }
 

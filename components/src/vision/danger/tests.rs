@@ -50,7 +50,8 @@ fn the_tunnel_without_the_box_is_quiet_in_both_cameras() {
             3.0 * noise.uniform() - 1.5,
             std::f64::consts::TAU * noise.uniform(),
         );
-        let scene = Scene { seed, light: 1.5 * noise.uniform() as f32, ..Scene::at(pose) };
+        let light = if seed % 2 == 0 { 1.4 } else { 0.5 };
+        let scene = Scene { seed, light, ..Scene::at(pose) };
         for camera in [Camera::fisheye(), Camera::perspective()] {
             let score = score_of(&camera.render(&scene));
             assert!(score < 0.2, "{score} at {pose:?}");
