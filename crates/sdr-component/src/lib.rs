@@ -1,5 +1,6 @@
 //! What a component author uses: `trait Component`, typed ports, `run()`.
 
+pub mod message;
 pub mod protocol;
 pub mod shm;
 #[expect(unsafe_code, reason = "descriptors, loans and ballast; each call says why it is sound")]
