@@ -1,0 +1,225 @@
+//! Figures and facts in tables.
+
+use super::{CAVEAT, PAPER_ACTIVATION_S, PAPER_RECOVERY_S, duration, or_dash, section, table};
+use crate::report::{Report, link::Pause, svg::escape};
+
+/// This run's figures beside the paper's.
+pub(super) fn headline(report: &Report) -> String {
+    let (run, figures) = (&report.run, &report.figures);
+    let lost: u64 = figures.samples.values().map(|(_, counts)| counts.lost).sum();
+    let received: u64 = figures.samples.values().map(|(_, counts)| counts.received).sum();
+    let pause = |pause: &Pause| {
+        let usual = or_dash(pause.period_median_ns.map(duration));
+        format!("{} (median period {usual})", duration(pause.gap_max_ns))
+    };
+    let paper = |seconds: u32| match report.extra.radio {
+        Some(_) => format!("{seconds} s"),
+        None => "-".to_owned(),
+    };
+    let moved = crate::render::units::count(figures.moves.len(), "component");
+    let mut rows = vec![
+        [
+            format!("{} components active", run.components.len()),
+            or_dash(figures.activation_ns.map(duration)),
+            paper(PAPER_ACTIVATION_S),
+            "deployment accepted until all are active and every connection has its first sample"
+                .to_owned(),
+        ],
+        [
+            format!("{moved} moved"),
+            or_dash(figures.recovery_ns.map(duration)),
+            paper(PAPER_RECOVERY_S),
+            "hold time over until active on the new home and heard by their consumers".to_owned(),
+        ],
+        [
+            "controller's pause".to_owned(),
+            or_dash(figures.commands.as_ref().map(pause)),
+            "-".to_owned(),
+            "longest pause of the commands at the wheels around the move".to_owned(),
+        ],
+        [
+            "samples lost".to_owned(),
+            format!("{lost} of {}", received + lost),
+            "-".to_owned(),
+            "missing in the sequence of any connection, whole run".to_owned(),
+        ],
+    ];
+    if let Some((mean, max)) = figures.position_error_m {
+        let error = format!("mean {mean:.2} m, largest {max:.2} m");
+        let what = "distance of the estimate from the world's truth";
+        rows.push(["position error".to_owned(), error, "-".to_owned(), what.to_owned()]);
+    }
+    if let Some(detector) = &report.extra.detector {
+        let stop = detector.stop_after_ms.map_or("did not stop".to_owned(), |ms| {
+            let distance = or_dash(detector.stop_distance_m.map(|m| format!("{m:.2} m")));
+            format!("stood after {:.2} s, {distance} before it", ms / 1e3)
+        });
+        let what = format!(
+            "{} shown, {} stops, {} without cause",
+            detector.shown, detector.stops, detector.stops_without_cause
+        );
+        rows.push(["dangerous object".to_owned(), stop, "-".to_owned(), what]);
+    }
+    let mut html = String::from(
+        "<div class=\"scroll\"><table class=\"big\">\n<tr><th></th><th>here</th><th>the paper</th><th>what is counted</th></tr>\n",
+    );
+    for [name, here, paper, what] in rows {
+        html.push_str(&format!(
+            "<tr><td>{}</td><td><strong>{}</strong></td><td>{}</td><td class=\"muted\">{}</td></tr>\n",
+            escape(&name), escape(&here), escape(&paper), escape(&what)
+        ));
+    }
+    html.push_str("</table></div>\n");
+    if report.extra.radio.is_some() {
+        html.push_str(&format!(
+            "<p class=\"muted\">The paper: three Raspberry Pi 4 on real Wi-Fi. {CAVEAT}</p>\n"
+        ));
+    }
+    for what in figures.not_activated.iter().chain(&figures.not_recovered) {
+        html.push_str(&format!("<p><strong>Missing:</strong> {}</p>\n", escape(what)));
+    }
+    html
+}
+
+/// Table IV of this run, and the bars of Tables V and VI.
+pub(super) fn environment(report: &Report) -> String {
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    let mut add = |item: &str, value: Option<String>| {
+        if let Some(value) = value {
+            rows.push(vec![item.to_owned(), value]);
+        }
+    };
+    if let Some(machine) = &report.extra.machine {
+        add("Machine", machine.model.clone());
+        add("Cores", machine.cores.map(|cores| cores.to_string()));
+        add("Memory", machine.memory_bytes.map(|bytes| format!("{} MB", bytes / 1_000_000)));
+        add("Kernel", machine.kernel.clone());
+        add("Huge pages", machine.huge_pages.clone());
+        let version = machine.sdr.as_ref().map(|version| {
+            let build = machine.build.as_deref().unwrap_or("unknown build");
+            let commit = machine.commit.as_deref().map(|commit| format!(", commit {commit}"));
+            let rustc = machine.rustc.as_deref().map(|rustc| format!(", {rustc}"));
+            format!("{version}, {build}{}{}", commit.unwrap_or_default(), rustc.unwrap_or_default())
+        });
+        add("sdr", version);
+    }
+    if let Some(radio) = &report.extra.radio {
+        add(
+            "Radio (played)",
+            Some(format!(
+                "level of {} from {} to {} dBm within {} s, noise {} dB; others stay at {} dBm",
+                radio.robot,
+                radio.from_dbm,
+                radio.to_dbm,
+                radio.fade_s,
+                radio.noise_db,
+                radio.from_dbm
+            )),
+        );
+        add("Data between robots", Some(radio.carrier.clone()));
+    }
+    for (name, metrics) in &report.run.robots {
+        let capacity = metrics
+            .last()
+            .map(|last| format!("{} MB for components", last.memory_capacity_bytes / 1_000_000));
+        add(name, capacity);
+    }
+    if let Some(bars) = &report.extra.bars {
+        add(
+            "Table V, allocation",
+            Some(format!(
+                "free memory after placing at least {} MB",
+                bars.allocation_memory_bytes / 1_000_000
+            )),
+        );
+        add(
+            "Table VI, recovery",
+            Some(format!(
+                "free memory {} MB or less; RSSI {:.1} dBm or less for 6 s",
+                bars.recovery_memory_bytes / 1_000_000,
+                bars.recovery_rssi_dbm
+            )),
+        );
+    }
+    let body = if rows.is_empty() {
+        "<p class=\"muted\">The recordings do not say.</p>\n".to_owned()
+    } else {
+        table(&["Item", "Device or setting"], &rows)
+    };
+    section("Table IV of this run", &body)
+}
+
+/// One row for each connection.
+pub(super) fn connections(report: &Report) -> String {
+    let figures = &report.figures;
+    let rows: Vec<Vec<String>> = figures
+        .samples
+        .iter()
+        .map(|(name, (sent, counts))| {
+            let period = report.run.links.get(name).and_then(|link| link.period_ns());
+            let pause = figures.pauses.get(name).copied().flatten();
+            vec![
+                name.clone(),
+                or_dash(sent.map(|sent| sent.to_string())),
+                counts.received.to_string(),
+                counts.lost.to_string(),
+                counts.fenced.to_string(),
+                counts.late.to_string(),
+                or_dash(period.map(duration)),
+                or_dash(pause.map(|pause| duration(pause.gap_max_ns))),
+            ]
+        })
+        .collect();
+    let head = [
+        "Connection",
+        ">sent",
+        ">received",
+        ">lost",
+        ">fenced",
+        ">late",
+        ">median period",
+        ">longest pause at the move",
+    ];
+    let note = "<p class=\"muted\">Sent is counted at the output from its first sample, also while nobody listens yet; lost are samples missing in the sequence; fenced are samples of an old home, refused.</p>\n";
+    section("Connections", &format!("{}{note}", table(&head, &rows)))
+}
+
+/// One row for each agent.
+pub(super) fn agents(report: &Report) -> String {
+    let megabytes = |bytes: Option<u64>| {
+        or_dash(bytes.map(|bytes| {
+            let tenths = bytes / 100_000;
+            format!("{}.{} MB", tenths / 10, tenths % 10)
+        }))
+    };
+    let rows: Vec<Vec<String>> = report
+        .summary
+        .agents
+        .iter()
+        .map(|(name, agent)| {
+            vec![
+                name.clone(),
+                megabytes(agent.rss_bytes),
+                megabytes(agent.rss_bytes_max),
+                megabytes(agent.pss_bytes),
+                or_dash(agent.cpu_permille.map(|cpu| format!("{}.{} %", cpu / 10, cpu % 10))),
+            ]
+        })
+        .collect();
+    let head =
+        ["Agent", ">RSS, median", ">RSS, largest", ">PSS, median", ">CPU of one core, median"];
+    section("What the agents took", &table(&head, &rows))
+}
+
+/// Where all this comes from.
+pub(super) fn files(report: &Report) -> String {
+    let mut html = String::from("<ul>\n");
+    for file in &report.summary.recordings {
+        html.push_str(&format!("<li><code>{}</code></li>\n", escape(file)));
+    }
+    html.push_str("</ul>\n<p class=\"muted\">MCAP with ROS 2 schemas: Foxglove, Lichtblick and <code>rosbags</code> open them; <code>sdr report</code> makes this page from them again.</p>\n");
+    for note in &report.summary.notes {
+        html.push_str(&format!("<p>{}</p>\n", escape(note)));
+    }
+    section("Recordings", &html)
+}
