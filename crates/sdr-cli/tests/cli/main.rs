@@ -1,0 +1,8 @@
+//! The built `sdr` against an agent with canned answers: exit codes, stdout, stderr.
+
+mod agent;
+mod sdr;
+
+mod asking;
+mod files;
+mod waiting;
