@@ -10,29 +10,7 @@ use sdr_core::{
 };
 
 use super::*;
-
-/// A robot of its own for each test; everything is gone afterwards.
-struct Place {
-    memory: SharedMemory,
-    _folder: tempfile::TempDir,
-}
-
-fn place() -> Place {
-    let folder = tempfile::tempdir_in("/dev/shm").unwrap();
-    let word = folder.path().file_name().unwrap().to_str().unwrap().replace(".tmp", "");
-    let prefix = format!("t{word}_");
-    Place { memory: SharedMemory { prefix, root: folder.path().to_owned() }, _folder: folder }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        for entry in std::fs::read_dir("/dev/shm").unwrap().flatten() {
-            if entry.file_name().to_string_lossy().starts_with(&self.memory.prefix) {
-                let _ = std::fs::remove_file(entry.path());
-            }
-        }
-    }
-}
+use crate::testing::Place;
 
 fn token() -> Token {
     Token { epoch: Epoch::first(&RobotId::new("robot-1").unwrap()), run: 1 }
@@ -52,7 +30,7 @@ fn is_readable(subscriber: &Subscriber) -> bool {
 
 #[test]
 fn what_is_sent_arrives_in_order_with_its_header_and_wakes_the_reader() {
-    let place = place();
+    let place = Place::new();
     let memory = Memory::open(&place.memory, "test").unwrap();
     let subscriber = memory.subscriber("s/c/p", 8).unwrap();
     let publisher = memory.publisher("s/c/p", 8, 16).unwrap();
@@ -74,7 +52,7 @@ fn what_is_sent_arrives_in_order_with_its_header_and_wakes_the_reader() {
 
 #[test]
 fn a_slow_reader_loses_its_oldest_samples() {
-    let place = place();
+    let place = Place::new();
     let memory = Memory::open(&place.memory, "test").unwrap();
     let publisher = memory.publisher("s/c/p", 8, 16).unwrap();
     let subscriber = memory.subscriber("s/c/p", 2).unwrap();
@@ -92,7 +70,7 @@ fn a_slow_reader_loses_its_oldest_samples() {
 
 #[test]
 fn a_full_queue_may_be_held_while_more_arrives() {
-    let place = place();
+    let place = Place::new();
     let memory = Memory::open(&place.memory, "test").unwrap();
     let publisher = memory.publisher("s/c/p", 64, 16).unwrap();
     let subscriber = memory.subscriber("s/c/p", 64).unwrap();
@@ -108,7 +86,7 @@ fn a_full_queue_may_be_held_while_more_arrives() {
 
 #[test]
 fn those_who_open_a_port_with_other_depths_get_the_first_one_s_class() {
-    let place = place();
+    let place = Place::new();
     let memory = Memory::open(&place.memory, "test").unwrap();
     let publisher = memory.publisher("s/c/p", 8, 16).unwrap();
     let subscriber = memory.subscriber("s/c/p", 64).unwrap();
@@ -122,7 +100,7 @@ fn those_who_open_a_port_with_other_depths_get_the_first_one_s_class() {
 
 #[test]
 fn two_robots_on_one_machine_do_not_hear_each_other() {
-    let (here, there) = (place(), place());
+    let (here, there) = (Place::new(), Place::new());
     let mine = Memory::open(&here.memory, "test").unwrap();
     let theirs = Memory::open(&there.memory, "test").unwrap();
     let subscriber = mine.subscriber("s/c/p", 2).unwrap();
@@ -134,7 +112,7 @@ fn two_robots_on_one_machine_do_not_hear_each_other() {
 
 #[test]
 fn a_sample_over_the_bound_is_refused_with_the_number() {
-    let place = place();
+    let place = Place::new();
     let memory = Memory::open(&place.memory, "test").unwrap();
     let publisher = memory.publisher("s/c/p", 8, 16).unwrap();
 
@@ -157,7 +135,7 @@ fn a_place_that_cannot_work_is_refused_before_anything_is_made() {
 #[test]
 #[ignore = "a measurement, not a claim"]
 fn cost_of_a_port() {
-    let place = place();
+    let place = Place::new();
     let memory = Memory::open(&place.memory, "test").unwrap();
     let rss = || {
         let text = std::fs::read_to_string("/proc/self/status").unwrap();
