@@ -1,72 +1,26 @@
 //! Figures and facts in tables.
 
 use super::{CAVEAT, PAPER_ACTIVATION_S, PAPER_RECOVERY_S, duration, or_dash, section, table};
-use crate::report::{Report, link::Pause, svg::escape};
+use crate::{
+    render::units::count,
+    report::{Report, svg::escape},
+};
 
 /// This run's figures beside the paper's.
 pub(super) fn headline(report: &Report) -> String {
-    let (run, figures) = (&report.run, &report.figures);
-    let lost: u64 = figures.samples.values().map(|(_, counts)| counts.lost).sum();
-    let received: u64 = figures.samples.values().map(|(_, counts)| counts.received).sum();
-    let pause = |pause: &Pause| {
-        let usual = or_dash(pause.period_median_ns.map(duration));
-        format!("{} (median period {usual})", duration(pause.gap_max_ns))
-    };
-    let paper = |seconds: u32| match report.extra.radio {
-        Some(_) => format!("{seconds} s"),
-        None => "-".to_owned(),
-    };
-    let moved = crate::render::units::count(figures.moves.len(), "component");
-    let mut rows = vec![
-        [
-            format!("{} components active", run.components.len()),
-            or_dash(figures.activation_ns.map(duration)),
-            paper(PAPER_ACTIVATION_S),
-            "deployment accepted until all are active and every connection has its first sample"
-                .to_owned(),
-        ],
-        [
-            format!("{moved} moved"),
-            or_dash(figures.recovery_ns.map(duration)),
-            paper(PAPER_RECOVERY_S),
-            "hold time over until active on the new home and heard by their consumers".to_owned(),
-        ],
-        [
-            "controller's pause".to_owned(),
-            or_dash(figures.commands.as_ref().map(pause)),
-            "-".to_owned(),
-            "longest pause of the commands at the wheels around the move".to_owned(),
-        ],
-        [
-            "samples lost".to_owned(),
-            format!("{lost} of {}", received + lost),
-            "-".to_owned(),
-            "missing in the sequence of any connection, whole run".to_owned(),
-        ],
-    ];
-    if let Some((mean, max)) = figures.position_error_m {
-        let error = format!("mean {mean:.2} m, largest {max:.2} m");
-        let what = "distance of the estimate from the world's truth";
-        rows.push(["position error".to_owned(), error, "-".to_owned(), what.to_owned()]);
-    }
-    if let Some(detector) = &report.extra.detector {
-        let stop = detector.stop_after_ms.map_or("did not stop".to_owned(), |ms| {
-            let distance = or_dash(detector.stop_distance_m.map(|m| format!("{m:.2} m")));
-            format!("stood after {:.2} s, {distance} before it", ms / 1e3)
-        });
-        let what = format!(
-            "{} shown, {} stops, {} without cause",
-            detector.shown, detector.stops, detector.stops_without_cause
-        );
-        rows.push(["dangerous object".to_owned(), stop, "-".to_owned(), what]);
-    }
+    let mut rows = durations(report);
+    rows.extend(behaviour(report));
     let mut html = String::from(
-        "<div class=\"scroll\"><table class=\"big\">\n<tr><th></th><th>here</th><th>the paper</th><th>what is counted</th></tr>\n",
+        "<div class=\"scroll\"><table class=\"big\">\n<tr><th></th><th>here</th><th>the paper</th>\
+         <th>what is counted</th></tr>\n",
     );
     for [name, here, paper, what] in rows {
         html.push_str(&format!(
             "<tr><td>{}</td><td><strong>{}</strong></td><td>{}</td><td class=\"muted\">{}</td></tr>\n",
-            escape(&name), escape(&here), escape(&paper), escape(&what)
+            escape(&name),
+            escape(&here),
+            escape(&paper),
+            escape(&what)
         ));
     }
     html.push_str("</table></div>\n");
@@ -75,10 +29,85 @@ pub(super) fn headline(report: &Report) -> String {
             "<p class=\"muted\">The paper: three Raspberry Pi 4 on real Wi-Fi. {CAVEAT}</p>\n"
         ));
     }
-    for what in figures.not_activated.iter().chain(&figures.not_recovered) {
+    for what in report.figures.not_activated.iter().chain(&report.figures.not_recovered) {
         html.push_str(&format!("<p><strong>Missing:</strong> {}</p>\n", escape(what)));
     }
     html
+}
+
+/// How long it took.
+fn durations(report: &Report) -> Vec<[String; 4]> {
+    let figures = &report.figures;
+    let paper = |seconds: u32| match report.extra.radio {
+        Some(_) => format!("{seconds} s"),
+        None => "-".to_owned(),
+    };
+    let active = format!("{} active", count(report.run.components.len(), "component"));
+    let moved = format!("{} moved", count(figures.moves.len(), "component"));
+    vec![
+        [
+            active,
+            or_dash(figures.activation_ns.map(duration)),
+            paper(PAPER_ACTIVATION_S),
+            "deployment accepted until all are active and every connection has its first sample"
+                .to_owned(),
+        ],
+        [
+            moved,
+            or_dash(figures.recovery_ns.map(duration)),
+            paper(PAPER_RECOVERY_S),
+            "hold time over until active on the new home and heard by their consumers".to_owned(),
+        ],
+    ]
+}
+
+/// What the robot and its streams felt.
+fn behaviour(report: &Report) -> Vec<[String; 4]> {
+    let figures = &report.figures;
+    let usual = figures.commands.and_then(|pause| pause.period_median_ns);
+    let lost: u64 = figures.samples.values().map(|(_, counts)| counts.lost).sum();
+    let received: u64 = figures.samples.values().map(|(_, counts)| counts.received).sum();
+    let row =
+        |name: &str, here: String, what: String| [name.to_owned(), here, "-".to_owned(), what];
+    let mut rows = vec![
+        row(
+            "controller's pause",
+            or_dash(figures.commands.map(|pause| duration(pause.gap_max_ns))),
+            format!(
+                "longest pause of the commands at the wheels around the move; median period {}",
+                or_dash(usual.map(duration))
+            ),
+        ),
+        row(
+            "samples lost",
+            lost.to_string(),
+            format!(
+                "missing in the sequence of any connection, of {} in the whole run",
+                received + lost
+            ),
+        ),
+    ];
+    if let Some((mean, max)) = figures.position_error_m {
+        let what =
+            format!("mean distance of the estimate from the world's truth; largest {max:.2} m");
+        rows.push(row("position error", format!("{mean:.2} m"), what));
+    }
+    if let Some(detector) = &report.extra.detector {
+        let after = detector.stop_after_ms.map(|ms| format!("{:.2} s", ms / 1e3));
+        let what = format!(
+            "from its appearance until the robot stood, {} before it; shown {}, stops {}, stops without cause {}",
+            or_dash(detector.stop_distance_m.map(|m| format!("{m:.2} m"))),
+            detector.shown,
+            detector.stops,
+            detector.stops_without_cause
+        );
+        rows.push(row(
+            "dangerous object",
+            after.unwrap_or_else(|| "did not stop".to_owned()),
+            what,
+        ));
+    }
+    rows
 }
 
 /// Table IV of this run, and the bars of Tables V and VI.

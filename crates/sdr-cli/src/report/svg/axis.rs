@@ -56,7 +56,7 @@ pub(super) fn ticks(from: f64, to: f64, count: u32) -> Vec<f64> {
     let step = [1.0, 2.0, 5.0, 10.0]
         .into_iter()
         .map(|factor| factor * power)
-        .find(|step| *step >= rough * 0.999)
+        .find(|step| *step >= rough * 0.7)
         .unwrap_or(10.0 * power);
     let mut ticks = Vec::new();
     let mut index = (from / step - 1e-9).ceil();

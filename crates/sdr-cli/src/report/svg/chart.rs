@@ -54,7 +54,7 @@ pub(crate) enum MarkKind {
 }
 
 impl Mark {
-    pub(super) fn draw(&self, svg: &mut Svg, axis: &TimeAxis, bottom: f64) {
+    pub(super) fn draw(&self, svg: &mut Svg, axis: &TimeAxis, (top, bottom): (f64, f64)) {
         if !axis.shows(self.at_s) {
             return;
         }
@@ -63,13 +63,18 @@ impl Mark {
             MarkKind::Recovery => "mark recovery",
         };
         let x = axis.x(self.at_s);
-        svg.line(class, (x, TITLE), (x, bottom));
+        svg.line(class, (x, top), (x, bottom));
     }
 }
 
 impl LinePanel {
+    /// From where to where marks go through it.
+    pub(super) fn spans(&self, top: f64) -> (f64, f64) {
+        (top + TITLE, top + HEIGHT - FOOT)
+    }
+
     pub(super) fn draw(&self, svg: &mut Svg, axis: &TimeAxis, top: f64, letter: char) {
-        let (upper, lower) = (top + TITLE, top + HEIGHT - FOOT);
+        let (upper, lower) = self.spans(top);
         svg.text(
             "title",
             (LEFT, top + 15.0),
@@ -99,7 +104,7 @@ impl LinePanel {
         svg.path("value", &path(points.iter().map(|&(at, value)| (axis.x(at), y(value)))));
         for bar in &self.bars {
             svg.line("bar", (LEFT, y(bar.at)), (RIGHT, y(bar.at)));
-            svg.text("bar-label", (RIGHT - 4.0, y(bar.at) - 4.0), Anchor::End, &bar.label);
+            svg.text("bar-label", (LEFT + 6.0, y(bar.at) - 4.0), Anchor::Start, &bar.label);
         }
     }
 

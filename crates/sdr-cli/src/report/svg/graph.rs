@@ -96,7 +96,14 @@ impl Graph {
                 if from.robot == to.robot { "head memory" } else { "head dds" },
                 &curve.head(),
             );
-            badges.push((curve.at(0.5), edge.number));
+            // A number stands where it hides no other.
+            let free = |at: &(f64, f64)| {
+                let far =
+                    |other: &((f64, f64), usize)| (other.0.0 - at.0).hypot(other.0.1 - at.1) > 19.0;
+                badges.iter().all(far)
+            };
+            let places = [0.5, 0.35, 0.65, 0.25, 0.75].map(|t| curve.at(t));
+            badges.push((places.into_iter().find(free).unwrap_or(places[0]), edge.number));
         }
         for (at, number) in badges {
             svg.disc("badge", at, 9.0);

@@ -44,16 +44,15 @@ pub(crate) fn stack(label: &str, axis: &TimeAxis, panels: &[Panel], marks: &[Mar
         match panel {
             Panel::Line(panel) => {
                 panel.draw(&mut svg, axis, top, letter);
+                marks.iter().for_each(|mark| mark.draw(&mut svg, axis, panel.spans(top)));
                 top += chart::HEIGHT;
             }
             Panel::Strip(panel) => {
                 panel.draw(&mut svg, axis, top, letter);
+                marks.iter().for_each(|mark| mark.draw(&mut svg, axis, panel.spans(top)));
                 top += strip::HEIGHT;
             }
         }
-    }
-    for mark in marks {
-        mark.draw(&mut svg, axis, top);
     }
     axis.draw(&mut svg, top);
     svg.finish()

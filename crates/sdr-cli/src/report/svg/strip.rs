@@ -56,6 +56,11 @@ impl StripState {
 }
 
 impl Strip {
+    /// From where to where marks go through it.
+    pub(super) fn spans(&self, top: f64) -> (f64, f64) {
+        (top + TITLE - 4.0, top + TITLE + FULL)
+    }
+
     pub(super) fn draw(&self, svg: &mut Svg, axis: &TimeAxis, top: f64, letter: char) {
         let foot = top + TITLE + FULL;
         let title = format!("({letter}) {}", self.title);
