@@ -15,6 +15,9 @@ pub const POST_RADIUS_M: f64 = 0.14;
 /// Height of a landmark post, metres; the colours meet half way up.
 pub const POST_HEIGHT_M: f64 = 1.6;
 
+/// Where the leader of a convoy starts: in the right lane, looking along the tunnel.
+pub const START: Pose = Pose { x: 1.5, y: -0.8, yaw: 0.0 };
+
 /// Where something is and where it looks.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Pose {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::WorldError;
-use crate::tunnel::Pose;
+use crate::tunnel::{Pose, START};
 
 /// Most robots in one world.
 const ROBOTS_MAX: usize = 64;
@@ -25,17 +25,16 @@ pub struct WorldConfig {
 }
 
 impl WorldConfig {
-    /// Rovers that keep station about the one with the wheels in use, which starts at
-    /// (1.5, -0.8) and looks along the tunnel.
+    /// Rovers that keep station about the one with the wheels in use, which begins at
+    /// [`START`].
     pub fn convoy(folder: &Path, leader: &str, followers: &[&str], seed: u64) -> Self {
-        let start = Pose::new(1.5, -0.8, 0.0);
-        let mut rovers = vec![RoverConfig::new(leader, start)];
+        let mut rovers = vec![RoverConfig::new(leader, START)];
         for (index, name) in followers.iter().enumerate() {
             let row = index / 2 + 1;
             let side = if index % 2 == 0 { 0.35 } else { -0.35 };
             let offset = Pose::new(-0.5 * row as f64, side, 0.0);
             let drive = Drive::Station { leader: leader.to_owned(), offset };
-            rovers.push(RoverConfig { drive, ..RoverConfig::new(name, start.at_offset(&offset)) });
+            rovers.push(RoverConfig { drive, ..RoverConfig::new(name, START.at_offset(&offset)) });
         }
         Self { folder: folder.to_owned(), rovers, seed, schedule: Vec::new() }
     }
