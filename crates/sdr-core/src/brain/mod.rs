@@ -1,17 +1,65 @@
 //! The one place where decisions are made: inputs in, effects out.
+//!
+//! ```text
+//! handle(input) ─▶ take it in (mesh, instances, store, plans)
+//!               ─▶ settle:  role ─▶ decide ─▶ reconcile ─▶ judge ─▶ say ─▶ routes ─▶ store
+//!                           (who    (where    (what runs   (own     (what  (DDS)   (disk)
+//!                           leads)  things go) here)       trouble) I am)
+//! ```
+//!
+//! `decide` acts only on the coordinator, and only mints records; every robot `reconcile`s
+//! what should be on itself with what is. Nothing is ever told to another robot but records.
 
 mod config;
+mod decide;
+mod effects;
+mod gone;
+mod instances;
+mod judge;
+mod launch;
+mod minting;
+mod moves;
+mod plans;
+mod problem;
+mod reconcile;
+mod requests;
+mod role;
+mod routes;
+mod say;
+mod status;
+mod systems;
+#[cfg(test)]
+mod tests;
 
-use alloc::{boxed::Box, collections::VecDeque};
+use alloc::{
+    boxed::Box,
+    collections::{BTreeMap, BTreeSet, VecDeque},
+    string::String,
+};
 
 pub use config::{BrainConfig, MakeRecovery, Seams};
 
 use crate::{
     api::StatusView,
     effect::{Effect, StoredState},
-    input::Input,
-    time::Instant,
+    id::{ComponentKey, Name, RobotId},
+    input::{Input, InstanceId},
+    mesh::{FleetTable, Incarnation, Mesh, MeshConfig, MeshNews},
+    order::hash64,
+    recover::{Cause, Fault},
+    report::{ConditionReport, HostReport},
+    time::{Duration, Instant},
 };
+use instances::{Instance, RunBook};
+use judge::{Engine, RestartPlan};
+use minting::Desk;
+use moves::MoveWatch;
+use plans::PlanDesk;
+use say::Said;
+use systems::SystemNow;
+
+/// A handler that was not called for so long was itself paused: it judges nobody by it.
+const PAUSE_MIN: Duration = Duration::from_millis(800);
 
 /// The decisions of one robot as a state machine without I/O.
 ///
@@ -19,23 +67,126 @@ use crate::{
 #[derive(Debug)]
 pub struct Brain {
     config: BrainConfig,
+    me: RobotId,
+    seams: Seams,
+    mesh: Mesh,
     effects: VecDeque<Effect>,
+    started_at: Instant,
+    handled_at: Instant,
+    joined_at: Option<Instant>,
+
+    systems: BTreeMap<Name, SystemNow>,
+    instances: BTreeMap<InstanceId, Instance>,
+    instance_last: InstanceId,
+    runs: BTreeMap<ComponentKey, RunBook>,
+    matched: BTreeMap<String, u16>,
+    routes: alloc::vec::Vec<crate::effect::Route>,
+
+    host: Option<HostReport>,
+    said: Said,
+    engines: BTreeMap<Name, Engine>,
+    faults: BTreeMap<ComponentKey, Fault>,
+    conditions: BTreeMap<(Name, Cause), ConditionReport>,
+    restarts: BTreeMap<ComponentKey, RestartPlan>,
+    held: BTreeMap<ComponentKey, String>,
+    judge_due: bool,
+    drains: BTreeMap<ComponentKey, Instant>,
+
+    plans: PlanDesk,
+    moves: BTreeMap<ComponentKey, MoveWatch>,
+    left: BTreeMap<(ComponentKey, RobotId), Instant>,
+    desk: Desk,
+    duplicates_told: BTreeSet<core::net::SocketAddr>,
 }
 
 impl Brain {
     /// A brain that continues from what its robot had on disk.
+    ///
+    /// It is mute until its new incarnation has reached the disk.
     pub fn new(
         config: BrainConfig,
-        _seams: Seams,
-        _stored: Option<StoredState>,
-        _now: Instant,
+        seams: Seams,
+        stored: Option<StoredState>,
+        now: Instant,
     ) -> Box<Self> {
-        Box::new(Self { config, effects: VecDeque::new() })
+        let stored = stored.unwrap_or_default();
+        let own = Incarnation {
+            counter: stored.incarnation.saturating_add(1),
+            nonce: u32::try_from(config.seed >> 32).unwrap_or(0),
+        };
+        let mesh_config = MeshConfig {
+            robot: config.robot.clone(),
+            fleet: u32::try_from(hash64(config.fleet.as_bytes()) & 0xffff_ffff).unwrap_or(0),
+            seeds: config.seeds.clone(),
+            listen: config.listen,
+            period: config.gossip_period,
+            gone_after: config.gone_after,
+        };
+        let fleet = FleetTable::from_stored(stored.fleet);
+        let mesh = Mesh::new(mesh_config, own, fleet, &stored.peers, now);
+        let runs = stored.runs.into_iter().map(|(key, run)| (key, RunBook::from_disk(run)));
+        let mut brain = Box::new(Self {
+            me: config.robot.clone(),
+            config,
+            seams,
+            mesh,
+            effects: VecDeque::new(),
+            started_at: now,
+            handled_at: now,
+            joined_at: None,
+            systems: BTreeMap::new(),
+            instances: BTreeMap::new(),
+            instance_last: 0,
+            runs: runs.collect(),
+            matched: BTreeMap::new(),
+            routes: alloc::vec::Vec::new(),
+            host: None,
+            said: Said::default(),
+            engines: BTreeMap::new(),
+            faults: BTreeMap::new(),
+            conditions: BTreeMap::new(),
+            restarts: BTreeMap::new(),
+            held: BTreeMap::new(),
+            judge_due: false,
+            drains: BTreeMap::new(),
+            plans: PlanDesk::default(),
+            moves: BTreeMap::new(),
+            left: BTreeMap::new(),
+            desk: Desk::default(),
+            duplicates_told: BTreeSet::new(),
+        });
+        brain.refresh_systems();
+        brain.say_facts();
+        brain.store_now();
+        brain
     }
 
     /// Takes one input at `now`; time never goes back.
-    pub fn handle(&mut self, _now: Instant, _input: Input) {
-        let _ = &self.config;
+    pub fn handle(&mut self, now: Instant, input: Input) {
+        let pause = now.since(self.handled_at);
+        if pause >= PAUSE_MIN {
+            self.mesh.forgive_pause(pause);
+        }
+        self.handled_at = now;
+        match input {
+            Input::Tick => {}
+            Input::Datagram { from, bytes } => self.mesh.handle_datagram(now, from, &bytes),
+            Input::Host(host) => {
+                self.host = Some(host);
+                self.judge_due = true;
+            }
+            Input::Usage(figures) => self.handle_usage(figures),
+            Input::Instance { instance, news } => self.handle_instance(now, instance, news),
+            Input::Route { path, matched } => {
+                self.matched.insert(path, matched);
+            }
+            Input::Deploy { request, system } => self.handle_deploy(request, system),
+            Input::Undeploy { request, system } => self.handle_undeploy(request, &system),
+            Input::Planned { plan, result } => self.handle_planned(now, plan, result),
+            Input::Stored { ticket } => self.handle_stored(ticket),
+            Input::StoreFailed { ticket, reason } => self.handle_store_failed(ticket, &reason),
+        }
+        self.settle(now);
     }
 
     /// The next order to the shell.
@@ -45,18 +196,91 @@ impl Brain {
 
     /// When `Input::Tick` is due at the latest.
     pub fn next_deadline(&self) -> Option<Instant> {
-        None
+        let restarts = self.restarts.values().map(|restart| restart.at);
+        let drains = self.drains.values().map(|since| *since + self.config.drain_max);
+        let timers = restarts
+            .chain(drains)
+            .chain(self.engines.values().filter_map(Engine::next_deadline))
+            .chain(self.plans.next_deadline())
+            .chain(self.instance_deadlines())
+            .chain(self.move_deadlines())
+            .chain(self.desk.retry_at())
+            .chain((!self.may_begin(self.handled_at)).then(|| self.begin_deadline()));
+        // a timer that is already past was acted on and waits for something else
+        let timers = timers.filter(|at| *at > self.handled_at);
+        timers.chain(Some(self.mesh.next_deadline())).min()
     }
 
     /// What this robot believes of the fleet, for the API.
-    pub fn status(&self, _now: Instant) -> StatusView {
-        StatusView {
-            seen_from: self.config.robot.as_str().into(),
-            coordinator: None,
-            term: 0,
-            robots: alloc::vec::Vec::new(),
-            systems: alloc::vec::Vec::new(),
-            conditions: alloc::vec::Vec::new(),
+    pub fn status(&self, now: Instant) -> StatusView {
+        self.status_view(now)
+    }
+
+    /// Counters of the mesh, for metrics.
+    pub fn mesh_counters(&self) -> crate::mesh::MeshCounters {
+        self.mesh.counters()
+    }
+
+    /// Brings everything into agreement with what was just learnt.
+    fn settle(&mut self, now: Instant) {
+        self.mesh.handle_tick(now);
+        self.take_news(now);
+        self.consider_role(now);
+        self.decide(now);
+        self.reconcile(now);
+        if self.judge_due || self.engines.values().any(|engine| engine.is_due(now)) {
+            self.judge(now);
+            self.reconcile(now);
         }
+        self.say(now);
+        self.update_routes();
+        self.store_if_dirty(now);
+        if self.desk.may_speak() {
+            while let Some((to, bytes)) = self.mesh.poll_send() {
+                self.effects.push_back(Effect::Send { to, bytes });
+            }
+        }
+    }
+
+    fn take_news(&mut self, now: Instant) {
+        let mut refresh = false;
+        while let Some(news) = self.mesh.poll_news() {
+            match news {
+                MeshNews::Report(_) => {}
+                MeshNews::Record(key) => {
+                    self.desk.mark_dirty();
+                    refresh |= systems::shapes_systems(key.kind);
+                }
+                MeshNews::Alive(robot) => {
+                    self.joined_at.get_or_insert(now);
+                    let text = alloc::format!("{robot} is heard");
+                    self.event("robot-alive", text);
+                    self.plans.retry_soon();
+                }
+                MeshNews::Gone(robot) => self.note_gone(now, &robot),
+                MeshNews::DuplicateId(from) => {
+                    if self.duplicates_told.len() < 16 && self.duplicates_told.insert(from) {
+                        let text = alloc::format!("{from} speaks under this robot's name");
+                        self.event("duplicate-robot-id", text);
+                    }
+                }
+            }
+        }
+        if refresh {
+            self.refresh_systems();
+        }
+    }
+
+    /// Whether this robot may start what it remembers: it has merged with a peer, or waited
+    /// for one long enough.
+    fn may_begin(&self, now: Instant) -> bool {
+        let merged = self.joined_at.is_some_and(|at| now >= at + self.config.gossip_period * 2);
+        let alone = self.config.seeds.iter().all(|seed| Some(*seed) == self.config.listen);
+        merged || alone || now >= self.begin_deadline()
+    }
+
+    fn begin_deadline(&self) -> Instant {
+        let waited = self.started_at + self.config.rejoin_wait;
+        self.joined_at.map_or(waited, |at| waited.min(at + self.config.gossip_period * 2))
     }
 }

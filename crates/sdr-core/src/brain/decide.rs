@@ -1,0 +1,222 @@
+//! The coordinator's part: who has no home, who should leave, whose home is gone.
+
+use alloc::{
+    boxed::Box,
+    collections::BTreeMap,
+    format,
+    string::{String, ToString},
+    vec::Vec,
+};
+
+use super::{
+    Brain,
+    plans::{Asked, Purpose},
+    problem::Avoid,
+    systems::SystemNow,
+};
+use crate::{
+    allocate::{AllocError, Plan, Tier},
+    effect::Effect,
+    event::Event,
+    id::{Name, RobotId},
+    input::PlanId,
+    recover::Remedy,
+    report::{ConditionReport, Report},
+    time::Instant,
+};
+
+impl Brain {
+    pub(super) fn decide(&mut self, now: Instant) {
+        if !self.is_coordinator() || self.desk.is_minting() || self.desk.is_broken() {
+            return;
+        }
+        self.advance_moves(now);
+        if self.desk.is_minting() || self.plans.asked.is_some() || !self.may_begin(now) {
+            return;
+        }
+        let systems: Vec<SystemNow> = self.systems.values().cloned().collect();
+        for system in systems {
+            if self.ask_for_orphans(now, &system)
+                || self.ask_for_leavers(now, &system)
+                || self.ask_for_homeless(now, &system)
+            {
+                return;
+            }
+        }
+    }
+
+    fn ask_for_orphans(&mut self, now: Instant, system: &SystemNow) -> bool {
+        let purpose = Purpose::Rehome { reason: String::new() };
+        if !self.has_witness() || !self.plans.is_due(&system.name, &purpose, now) {
+            return false;
+        }
+        let orphans = self.orphans(now, &system.name);
+        let Some((_, reason)) = orphans.first() else { return false };
+        let purpose = Purpose::Rehome { reason: reason.clone() };
+        let names: Vec<Name> = orphans.iter().map(|(key, _)| key.name.clone()).collect();
+        self.ask(now, system, &names, purpose)
+    }
+
+    /// Components that a robot wants to be rid of, one robot and cause at a time.
+    fn ask_for_leavers(&mut self, now: Instant, system: &SystemNow) -> bool {
+        for (from, condition) in self.calls_for_help(&system.name) {
+            let leaves = |name: &&Name| {
+                self.wanted(&system.key(name)).is_some_and(|(_, assignment)| {
+                    assignment.home == from && assignment.standbys.is_empty()
+                })
+            };
+            let names: Vec<Name> = condition.components.iter().filter(leaves).cloned().collect();
+            let reason = condition.reason.clone();
+            let purpose = Purpose::Move { from, cause: condition.cause, reason };
+            if !names.is_empty() && self.ask(now, system, &names, purpose) {
+                return true;
+            }
+        }
+        false
+    }
+
+    fn ask_for_homeless(&mut self, now: Instant, system: &SystemNow) -> bool {
+        let homeless =
+            |spec: &&crate::spec::ComponentSpec| self.home(&system.key(&spec.name)).is_none();
+        let names: Vec<Name> =
+            system.components.iter().filter(homeless).map(|spec| spec.name.clone()).collect();
+        !names.is_empty() && self.ask(now, system, &names, Purpose::Deploy)
+    }
+
+    /// Conditions of living robots that call for another home.
+    pub(super) fn calls_for_help(&self, system: &Name) -> Vec<(RobotId, ConditionReport)> {
+        let mut calls = Vec::new();
+        for robot in self.alive_robots() {
+            let Some(author) = self.mesh.authors().author(&robot) else { continue };
+            for report in author.reports() {
+                let Report::Condition(condition) = report else { continue };
+                let elsewhere = match condition.remedy {
+                    Remedy::StandbyElsewhere | Remedy::LaunchElsewhere => true,
+                    Remedy::LocalStandby | Remedy::Restart { .. } | Remedy::Hold => false,
+                };
+                if condition.system == *system && elsewhere {
+                    calls.push((robot.clone(), condition.clone()));
+                }
+            }
+        }
+        calls
+    }
+
+    /// Asks the allocator, when the time for this question has come.
+    fn ask(&mut self, now: Instant, system: &SystemNow, names: &[Name], purpose: Purpose) -> bool {
+        if !self.plans.is_due(&system.name, &purpose, now) {
+            return false;
+        }
+        let tier = match purpose {
+            Purpose::Deploy => Tier::Strict,
+            Purpose::Move { .. } | Purpose::Rehome { .. } => Tier::Relaxed,
+        };
+        let avoid = self.avoid(now, system, names);
+        let problem = self.problem(system, names, tier, &avoid);
+        if problem.robots.is_empty() {
+            return false;
+        }
+        let plan = self.plans.next_id();
+        let versions = names
+            .iter()
+            .map(|name| {
+                let key = system.key(name);
+                let version = self.assignment(&key).map(|(version, _)| version.clone());
+                (key, version)
+            })
+            .collect();
+        self.plans.asked = Some(Asked { plan, system: system.name.clone(), purpose, versions });
+        self.effects.push_back(Effect::Plan { plan, problem: Box::new(problem) });
+        true
+    }
+
+    /// Robots a component must not go to: those that are in trouble of their own, and those
+    /// it left not long ago.
+    fn avoid(&self, now: Instant, system: &SystemNow, names: &[Name]) -> BTreeMap<Name, Avoid> {
+        let mut avoid: BTreeMap<Name, Avoid> = BTreeMap::new();
+        let calls = self.calls_for_help(&system.name);
+        for name in names {
+            let list = avoid.entry(name.clone()).or_default();
+            for (robot, condition) in &calls {
+                let robot_wide = !super::judge::is_event(condition.cause);
+                if robot_wide || condition.components.contains(name) {
+                    list.push((robot.clone(), condition.cause.to_string()));
+                }
+            }
+            for ((key, robot), until) in &self.left {
+                if *key == system.key(name) && now < *until {
+                    list.push((robot.clone(), String::from("left it not long ago")));
+                }
+            }
+        }
+        avoid
+    }
+
+    pub(super) fn handle_planned(
+        &mut self,
+        now: Instant,
+        plan: PlanId,
+        result: Result<Plan, AllocError>,
+    ) {
+        let Some(asked) = self.plans.asked.take_if(|asked| asked.plan == plan) else { return };
+        self.plans.answered(&asked, result.as_ref().ok(), now);
+        let stale = asked.versions.iter().any(|(key, version)| {
+            self.assignment(key).map(|(version, _)| version) != version.as_ref()
+        });
+        if stale || !self.is_coordinator() || !self.systems.contains_key(&asked.system) {
+            self.plans.retry_soon();
+            return;
+        }
+        match result {
+            Ok(plan) => self.adopt(now, &asked, &plan),
+            Err(error) => self.event("plan-failed", format!("{}: {error}", asked.system)),
+        }
+    }
+
+    fn adopt(&mut self, now: Instant, asked: &Asked, plan: &Plan) {
+        for homeless in &plan.homeless {
+            let refusals: Vec<String> = homeless.refusals.iter().map(ToString::to_string).collect();
+            let known =
+                self.plans.refusals.insert(homeless.component.clone(), homeless.refusals.clone());
+            if known.as_ref() != Some(&homeless.refusals) {
+                self.event_about("homeless", &homeless.component, refusals.join("; "));
+            }
+        }
+        for placement in &plan.placements {
+            self.plans.refusals.remove(&placement.component);
+            let reason = placed_reason(asked, placement);
+            let event = Event::new("placed", &self.me, reason).about(&placement.component);
+            #[expect(clippy::cast_precision_loss, reason = "memory stays below 2^53 bytes")]
+            let left = placement.memory_left.0 as f64;
+            let mut event = event.number("memory_left_bytes", left);
+            event.reason = format!("on {}: {}", placement.robot, event.reason);
+            self.push_event(event);
+        }
+        match &asked.purpose {
+            Purpose::Deploy | Purpose::Rehome { .. } => self.assign(asked, plan),
+            Purpose::Move { .. } => self.begin_move(now, asked, plan),
+        }
+    }
+}
+
+/// Why a component goes where it goes.
+pub(super) fn placed_reason(asked: &Asked, placement: &crate::allocate::Placement) -> String {
+    let mut reason = match &asked.purpose {
+        Purpose::Deploy => String::new(),
+        Purpose::Move { from, cause, reason } => format!("from {from}, {cause}: {reason}; "),
+        Purpose::Rehome { reason } => format!("{reason}; "),
+    };
+    if placement.refusals.is_empty() {
+        reason.push_str("first that fits");
+    } else {
+        let refusals: Vec<String> = placement.refusals.iter().map(ToString::to_string).collect();
+        reason.push_str(&refusals.join("; "));
+    }
+    reason.push_str(&format!("; {} left", placement.memory_left));
+    if placement.tier == Tier::Relaxed {
+        reason.push_str(" (relaxed tier)");
+    }
+    let end = reason.char_indices().nth(280).map_or(reason.len(), |(at, _)| at);
+    reason.truncate(end);
+    reason
+}

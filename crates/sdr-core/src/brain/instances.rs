@@ -1,0 +1,236 @@
+//! Processes of components on this robot, as far as the brain knows them.
+
+use alloc::{
+    collections::BTreeMap,
+    format,
+    string::{String, ToString},
+    vec::Vec,
+};
+
+use super::Brain;
+use crate::{
+    effect::Command,
+    event::Event,
+    id::ComponentKey,
+    input::{InstanceId, InstanceNews},
+    lifecycle::LifecycleState,
+    order::{Run, Token},
+    recover::{Cause, Fault},
+    report::Usage,
+    time::{Duration, Instant},
+};
+
+/// Runs reserved on disk at a time, so that no fsync lies on the way to an activation.
+pub(super) const RUNS_RESERVED: Run = 16;
+/// A prepared instance counts as ready so long after it became inactive, matched or not.
+const MATCH_WAIT: Duration = Duration::from_millis(500);
+
+/// What this robot told an instance last.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Told {
+    Nothing,
+    Activate(Token),
+    Deactivate,
+    Finish,
+}
+
+/// One started process.
+#[derive(Clone, Debug)]
+pub(super) struct Instance {
+    pub(super) component: ComponentKey,
+    /// Hash of its spec and wiring: another one needs another process.
+    pub(super) shape: u64,
+    pub(super) state: LifecycleState,
+    pub(super) token: Option<Token>,
+    pub(super) told: Told,
+    pub(super) inactive_at: Option<Instant>,
+    pub(super) ready: bool,
+    pub(super) usage: Usage,
+    pub(super) heard: BTreeMap<u16, Token>,
+}
+
+impl Instance {
+    pub(super) fn new(component: ComponentKey, shape: u64) -> Self {
+        Self {
+            component,
+            shape,
+            state: LifecycleState::Created,
+            token: None,
+            told: Told::Nothing,
+            inactive_at: None,
+            ready: false,
+            usage: Usage::default(),
+            heard: BTreeMap::new(),
+        }
+    }
+
+    pub(super) fn is_ending(&self) -> bool {
+        self.told == Told::Finish
+    }
+}
+
+/// Runs of one component on this robot: used, and reserved on disk.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RunBook {
+    pub(super) last: Run,
+    pub(super) reserved: Run,
+    pub(super) stored: Run,
+}
+
+impl RunBook {
+    /// After a start: everything reserved may have been used.
+    pub(super) fn from_disk(reserved: Run) -> Self {
+        Self { last: reserved, reserved, stored: reserved }
+    }
+
+    pub(super) fn fresh() -> Self {
+        Self::from_disk(0)
+    }
+}
+
+impl Brain {
+    /// The instance of a component that is not on its way out.
+    pub(super) fn current(&self, key: &ComponentKey) -> Option<InstanceId> {
+        let of = |(_, instance): &(&InstanceId, &Instance)| {
+            instance.component == *key && !instance.is_ending()
+        };
+        self.instances.iter().find(of).map(|(id, _)| *id)
+    }
+
+    pub(super) fn handle_usage(&mut self, figures: Vec<(InstanceId, Usage)>) {
+        for (id, usage) in figures {
+            if let Some(instance) = self.instances.get_mut(&id) {
+                instance.usage = usage;
+            }
+        }
+    }
+
+    pub(super) fn handle_instance(&mut self, now: Instant, id: InstanceId, news: InstanceNews) {
+        let Some(instance) = self.instances.get(&id) else { return };
+        let key = instance.component.clone();
+        match news {
+            InstanceNews::Started { pid } => {
+                let event = Event::new("started", &self.me, format!("process {pid}")).about(&key);
+                self.push_event(event.number("pid", f64::from(pid)));
+            }
+            InstanceNews::LaunchFailed { reason } => self.lose(id, &key, Cause::Exited, reason),
+            InstanceNews::Exited { reason } => self.lose(id, &key, Cause::Exited, reason),
+            InstanceNews::Hung { reason } => {
+                self.event_about("hung", &key, reason.clone());
+                self.raise(&key, Cause::Hung, reason);
+                self.kill(id);
+            }
+            InstanceNews::State { state, token, fault } => {
+                self.handle_state(now, id, (state, token));
+                if let Some((cause, reason)) = fault {
+                    self.event_about("error", &key, format!("{cause}: {reason}"));
+                    self.raise(&key, cause, reason);
+                }
+            }
+            InstanceNews::Heard { connection, token } => self.handle_heard(id, connection, token),
+        }
+    }
+
+    fn handle_state(
+        &mut self,
+        now: Instant,
+        id: InstanceId,
+        (state, token): (LifecycleState, Option<Token>),
+    ) {
+        let Some(instance) = self.instances.get_mut(&id) else { return };
+        let changed = instance.state != state || instance.token != token;
+        instance.state = state;
+        instance.token.clone_from(&token);
+        if state == LifecycleState::Inactive {
+            instance.inactive_at.get_or_insert(now);
+        }
+        if !changed {
+            return;
+        }
+        let key = instance.component.clone();
+        let kind = match state {
+            LifecycleState::Created => "created",
+            LifecycleState::Inactive => "inactive",
+            LifecycleState::Active => "active",
+            LifecycleState::Error => "in-error",
+            LifecycleState::Finalized => "finalized",
+        };
+        let mut event = Event::new(kind, &self.me, format!("{key} is {state}")).about(&key);
+        if let Some(token) = &token {
+            event = event.under(token);
+        }
+        self.push_event(event);
+    }
+
+    fn handle_heard(&mut self, id: InstanceId, connection: u16, token: Token) {
+        let Some(instance) = self.instances.get_mut(&id) else { return };
+        instance.heard.insert(connection, token.clone());
+        let key = instance.component.clone();
+        let label = self
+            .systems
+            .get(&key.system)
+            .and_then(|system| system.connections.iter().find(|c| c.index == connection))
+            .map_or_else(|| connection.to_string(), |c| c.label());
+        let event = Event::new("heard", &self.me, label).about(&key).under(&token);
+        self.push_event(event.number("connection", f64::from(connection)));
+    }
+
+    /// A process ended or never was; a fault unless it was told to end.
+    fn lose(&mut self, id: InstanceId, key: &ComponentKey, cause: Cause, reason: String) {
+        let Some(instance) = self.instances.remove(&id) else { return };
+        if instance.is_ending() {
+            self.event_about("ended", key, reason);
+            return;
+        }
+        self.event_about("exited", key, reason.clone());
+        self.raise(key, cause, reason);
+    }
+
+    /// Notes a fault of a component for the next judgement.
+    fn raise(&mut self, key: &ComponentKey, cause: Cause, reason: String) {
+        self.faults.insert(key.clone(), Fault { cause, reason });
+        self.judge_due = true;
+    }
+
+    /// Ends an instance in good order.
+    pub(super) fn finish(&mut self, id: InstanceId) {
+        self.end(id, Command::Finish);
+    }
+
+    /// Ends an instance that does not listen.
+    pub(super) fn kill(&mut self, id: InstanceId) {
+        self.end(id, Command::Kill);
+    }
+
+    fn end(&mut self, id: InstanceId, how: Command) {
+        let Some(instance) = self.instances.get_mut(&id) else { return };
+        if !instance.is_ending() {
+            instance.told = Told::Finish;
+            self.command(id, how);
+        }
+    }
+
+    /// Marks prepared instances as ready once their routes are matched, or were waited for
+    /// long enough.
+    pub(super) fn update_readiness(&mut self, now: Instant) {
+        let waiting: Vec<InstanceId> = self
+            .instances
+            .iter()
+            .filter(|(_, instance)| !instance.ready && instance.inactive_at.is_some())
+            .map(|(id, _)| *id)
+            .collect();
+        for id in waiting {
+            let instance = &self.instances[&id];
+            let waited = instance.inactive_at.is_some_and(|at| now >= at + MATCH_WAIT);
+            if waited || self.routes_matched(&instance.component) {
+                self.instances.get_mut(&id).expect("listed above").ready = true;
+            }
+        }
+    }
+
+    /// When the next instance counts as ready without being matched.
+    pub(super) fn instance_deadlines(&self) -> impl Iterator<Item = Instant> {
+        let waiting = self.instances.values().filter(|instance| !instance.ready);
+        waiting.filter_map(|instance| instance.inactive_at.map(|at| at + MATCH_WAIT))
+    }
+}

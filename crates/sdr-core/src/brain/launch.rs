@@ -1,0 +1,88 @@
+//! Starting processes: when, with which wiring, under which run.
+
+use alloc::{boxed::Box, vec::Vec};
+
+use super::{
+    Brain,
+    instances::{Instance, RUNS_RESERVED, RunBook},
+};
+use crate::{
+    effect::{Effect, InputWiring, LaunchOrder},
+    id::ComponentKey,
+    order::{Run, hash64},
+    spec::{ComponentSpec, Qos, port_path},
+    time::Instant,
+};
+
+impl Brain {
+    /// Starts a process unless something speaks against it for now.
+    pub(super) fn launch_when_due(&mut self, now: Instant, key: &ComponentKey) {
+        let due = self.restarts.get(key).is_none_or(|restart| now >= restart.at);
+        let ending = self.instances.values().any(|instance| instance.component == *key);
+        if !due || ending || !self.may_begin(now) || self.is_given_up(key) {
+            return;
+        }
+        let Some((spec, inputs, output_depth)) = self.shape_parts(key) else { return };
+        self.restarts.remove(key);
+        self.reserve_runs(key);
+        self.instance_last += 1;
+        let instance = self.instance_last;
+        let shape = shape_hash(&spec, &inputs);
+        self.instances.insert(instance, Instance::new(key.clone(), shape));
+        let order = LaunchOrder { instance, component: key.clone(), spec, inputs, output_depth };
+        self.effects.push_back(Effect::Launch(Box::new(order)));
+    }
+
+    /// The shape a process of this component should have now.
+    pub(super) fn shape(&self, key: &ComponentKey) -> Option<u64> {
+        self.shape_parts(key).map(|(spec, inputs, _)| shape_hash(&spec, &inputs))
+    }
+
+    fn shape_parts(&self, key: &ComponentKey) -> Option<(ComponentSpec, Vec<InputWiring>, u8)> {
+        let system = self.systems.get(&key.system)?;
+        let spec = system.component(&key.name)?.clone();
+        let incoming = system.connections.iter().filter(|c| c.to.component == key.name);
+        let inputs = incoming
+            .map(|connection| InputWiring {
+                port: connection.to.port.clone(),
+                connection: connection.index,
+                path: port_path(&system.key(&connection.from.component), &connection.from.port),
+                message_type: connection.message_type.clone(),
+                qos: connection.qos,
+            })
+            .collect();
+        let outgoing = system.connections.iter().filter(|c| c.from.component == key.name);
+        let depth = outgoing.map(|connection| connection.qos.depth).max();
+        Some((spec, inputs, depth.unwrap_or(Qos::default().depth)))
+    }
+
+    /// Keeps a block of runs reserved on disk.
+    fn reserve_runs(&mut self, key: &ComponentKey) {
+        let book = self.runs.entry(key.clone()).or_insert_with(RunBook::fresh);
+        if book.last + RUNS_RESERVED / 2 >= book.reserved {
+            book.reserved = book.last.saturating_add(RUNS_RESERVED);
+            self.desk.mark_dirty();
+        }
+    }
+
+    /// The next run, when it is on disk that it may have been used.
+    pub(super) fn next_run(&mut self, key: &ComponentKey) -> Option<Run> {
+        let book = self.runs.entry(key.clone()).or_insert_with(RunBook::fresh);
+        let next = book.last.saturating_add(1);
+        if next > book.stored {
+            book.reserved = book.reserved.max(next.saturating_add(RUNS_RESERVED));
+            self.desk.mark_dirty();
+            return None;
+        }
+        book.last = next;
+        Some(next)
+    }
+}
+
+/// Hash of what a process is started with; the place in the file does not matter.
+fn shape_hash(spec: &ComponentSpec, inputs: &[InputWiring]) -> u64 {
+    let mut spec = spec.clone();
+    spec.index = 0;
+    let bytes = postcard::to_allocvec(&(spec, inputs)).expect("writing plain data cannot fail");
+    hash64(&bytes)
+}

@@ -1,0 +1,149 @@
+//! Disk before wire: what this robot makes is stored before anybody hears of it.
+
+use alloc::{collections::BTreeMap, format, string::String, vec::Vec};
+
+use super::Brain;
+use crate::{
+    api::DeployAnswer,
+    effect::{Effect, StoredRecord, StoredState},
+    id::ComponentKey,
+    input::{RequestId, StoreTicket},
+    mesh::FleetRecord,
+    order::Run,
+    time::{Duration, Instant},
+};
+
+/// Pause after a failed store.
+const DISK_RETRY: Duration = Duration::from_secs(1);
+
+/// Records that wait for the disk.
+#[derive(Clone, Debug)]
+struct Mint {
+    ticket: StoreTicket,
+    records: Vec<FleetRecord>,
+    answer: Option<(RequestId, DeployAnswer)>,
+}
+
+/// What is on its way to the disk.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Desk {
+    last: StoreTicket,
+    in_flight: Option<StoreTicket>,
+    dirty: bool,
+    mints: Vec<Mint>,
+    runs_in_flight: BTreeMap<ComponentKey, Run>,
+    spoken: bool,
+    broken_at: Option<Instant>,
+}
+
+impl Desk {
+    pub(super) fn mark_dirty(&mut self) {
+        self.dirty = true;
+    }
+
+    /// Mute until the new incarnation is on disk (or the disk is known to be broken).
+    pub(super) fn may_speak(&self) -> bool {
+        self.spoken
+    }
+
+    /// Whether something made here is not in the table yet.
+    pub(super) fn is_minting(&self) -> bool {
+        !self.mints.is_empty()
+    }
+
+    /// When to try a broken disk again.
+    pub(super) fn retry_at(&self) -> Option<Instant> {
+        self.broken_at.map(|at| at + DISK_RETRY)
+    }
+
+    /// A robot that cannot store makes nothing.
+    pub(super) fn is_broken(&self) -> bool {
+        self.broken_at.is_some()
+    }
+}
+
+impl Brain {
+    /// Stores `records`, then publishes them, then answers.
+    pub(super) fn mint(
+        &mut self,
+        records: Vec<FleetRecord>,
+        answer: Option<(RequestId, DeployAnswer)>,
+    ) {
+        let ticket = self.desk.last + 1;
+        self.desk.mints.push(Mint { ticket, records, answer });
+        self.store_now();
+    }
+
+    pub(super) fn store_if_dirty(&mut self, now: Instant) {
+        let rests = self.desk.retry_at().is_some_and(|at| now < at);
+        if self.desk.dirty && self.desk.in_flight.is_none() && !rests {
+            self.store_now();
+        }
+    }
+
+    pub(super) fn store_now(&mut self) {
+        self.desk.last += 1;
+        self.desk.in_flight = Some(self.desk.last);
+        self.desk.dirty = false;
+        let runs: Vec<(ComponentKey, Run)> =
+            self.runs.iter().map(|(key, book)| (key.clone(), book.reserved)).collect();
+        self.desk.runs_in_flight = runs.iter().cloned().collect();
+        let mut fleet = self.mesh.fleet().clone();
+        for record in self.desk.mints.iter().flat_map(|mint| &mint.records) {
+            fleet.merge(record.clone());
+        }
+        let fleet: Vec<StoredRecord> = fleet.to_stored();
+        let state = StoredState {
+            incarnation: self.mesh.incarnation().counter,
+            fleet,
+            runs,
+            peers: self.mesh.peer_addresses(),
+        };
+        self.effects.push_back(Effect::Store { ticket: self.desk.last, state });
+    }
+
+    pub(super) fn handle_stored(&mut self, ticket: StoreTicket) {
+        self.desk.spoken = true;
+        if self.desk.broken_at.take().is_some() {
+            self.event("store-works-again", "");
+        }
+        if self.desk.in_flight == Some(ticket) {
+            self.desk.in_flight = None;
+            for (key, run) in core::mem::take(&mut self.desk.runs_in_flight) {
+                if let Some(book) = self.runs.get_mut(&key) {
+                    book.stored = book.stored.max(run);
+                }
+            }
+        }
+        let (done, waiting) =
+            core::mem::take(&mut self.desk.mints).into_iter().partition(|m| m.ticket <= ticket);
+        self.desk.mints = waiting;
+        for mint in done {
+            self.mesh.publish(mint.records);
+            if let Some((request, answer)) = mint.answer {
+                self.effects.push_back(Effect::Answer { request, result: Ok(answer) });
+            }
+        }
+    }
+
+    /// Keeps running, mints nothing, says so.
+    pub(super) fn handle_store_failed(&mut self, ticket: StoreTicket, reason: &str) {
+        self.desk.spoken = true;
+        self.desk.broken_at = Some(self.handled_at);
+        if self.desk.in_flight == Some(ticket) {
+            self.desk.in_flight = None;
+        }
+        let (lost, waiting): (Vec<Mint>, Vec<Mint>) =
+            core::mem::take(&mut self.desk.mints).into_iter().partition(|m| m.ticket <= ticket);
+        self.desk.mints = waiting;
+        for mint in lost {
+            if let Some((request, _)) = mint.answer {
+                let text = format!("{} could not store it: {reason}", self.me);
+                self.effects.push_back(Effect::Answer { request, result: Err(text) });
+            }
+        }
+        self.event("store-failed", String::from(reason));
+        self.plans.pause(self.handled_at);
+        self.desk.dirty = true;
+    }
+}

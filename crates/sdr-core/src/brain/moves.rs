@@ -1,0 +1,227 @@
+//! A move is: prepare, choose the new home under a new epoch, let the old one drain.
+//!
+//! The state of a move lives in the assignments (a target stands among the standbys), so
+//! that a new coordinator goes on where the last one stopped.
+
+use alloc::{format, string::ToString, vec, vec::Vec};
+
+use super::{
+    Brain,
+    decide::placed_reason,
+    plans::{Asked, Purpose},
+};
+use crate::{
+    allocate::{Placement, Plan},
+    event::Event,
+    id::{ComponentKey, RobotId},
+    lifecycle::LifecycleState,
+    mesh::FleetRecord,
+    order::{Epoch, Version},
+    record::{Assignment, FleetValue, RecordKind},
+    time::{Duration, Instant},
+};
+
+/// A move this coordinator watches.
+#[derive(Clone, Debug)]
+pub(super) struct MoveWatch {
+    since: Instant,
+    from: Option<RobotId>,
+    /// Set once the new home is chosen: done when it is active and heard.
+    epoch: Option<Epoch>,
+}
+
+impl Brain {
+    /// Gives homes under new epochs at once: nobody runs these components now.
+    pub(super) fn assign(&mut self, asked: &Asked, plan: &Plan) {
+        let records: Vec<FleetRecord> = plan
+            .placements
+            .iter()
+            .filter_map(|placement| {
+                self.new_home(
+                    &placement.component,
+                    &placement.robot,
+                    placed_reason(asked, placement),
+                )
+            })
+            .collect();
+        if !records.is_empty() {
+            self.mint(records, None);
+        }
+    }
+
+    /// Lists the targets as standbys, so that they prepare.
+    pub(super) fn begin_move(&mut self, now: Instant, asked: &Asked, plan: &Plan) {
+        let Purpose::Move { from, .. } = &asked.purpose else { return };
+        let mut records = Vec::new();
+        for placement in &plan.placements {
+            let key = &placement.component;
+            let reason = placed_reason(asked, placement);
+            // a component that does not run cannot be handed over: it just starts elsewhere
+            let runs = self
+                .instance_report(from, key)
+                .is_some_and(|report| report.state == LifecycleState::Active);
+            let record = match runs {
+                true => self.with_standby(placement, &reason),
+                false => self.new_home(key, &placement.robot, reason.clone()),
+            };
+            let Some(record) = record else { continue };
+            let epoch = record.version.epoch.clone().filter(|_| !runs);
+            records.push(record);
+            self.moves
+                .insert(key.clone(), MoveWatch { since: now, from: Some(from.clone()), epoch });
+            let text = format!("{from} -> {}: {reason}", placement.robot);
+            self.event_about("move-started", key, text);
+        }
+        if !records.is_empty() {
+            self.mint(records, None);
+        }
+    }
+
+    /// Chooses new homes whose targets are ready, gives up on those that are not, and says
+    /// which moves are done.
+    pub(super) fn advance_moves(&mut self, now: Instant) {
+        self.finish_moves(now);
+        let preparing: Vec<(ComponentKey, RobotId)> = self
+            .systems
+            .values()
+            .flat_map(|system| system.keys().collect::<Vec<_>>())
+            .filter_map(|key| {
+                let (_, assignment) = self.wanted(&key)?;
+                Some((key, assignment.standbys.first()?.clone()))
+            })
+            .collect();
+        let mut ready = Vec::new();
+        let mut lost = Vec::new();
+        for (key, target) in &preparing {
+            let watch = self.moves.entry(key.clone());
+            let watch = watch.or_insert(MoveWatch { since: now, from: None, epoch: None });
+            let late = now >= watch.since + self.config.prepare_max;
+            if late || !self.mesh.is_alive(target) {
+                lost.push((key.clone(), target.clone()));
+            } else if self.instance_report(target, key).is_some_and(|report| report.ready) {
+                ready.push((key.clone(), target.clone()));
+            }
+        }
+        if !lost.is_empty() {
+            self.cancel(now, &lost);
+        } else if !ready.is_empty() && ready.len() == preparing.len() {
+            self.switch(&ready);
+        }
+    }
+
+    /// All that are prepared change homes together.
+    fn switch(&mut self, ready: &[(ComponentKey, RobotId)]) {
+        let mut records = Vec::new();
+        for (key, target) in ready {
+            let reason = self.wanted(key).map(|(_, assignment)| assignment.reason.clone());
+            let Some(record) = self.new_home(key, target, reason.unwrap_or_default()) else {
+                continue;
+            };
+            if let Some(watch) = self.moves.get_mut(key) {
+                watch.epoch.clone_from(&record.version.epoch);
+            }
+            self.event_about("move-prepared", key, format!("{target} is ready"));
+            records.push(record);
+        }
+        self.mint(records, None);
+    }
+
+    /// Takes targets back that do not get ready; the components stay where they are.
+    fn cancel(&mut self, now: Instant, lost: &[(ComponentKey, RobotId)]) {
+        let mut records = Vec::new();
+        for (key, target) in lost {
+            self.event_about("move-failed", key, format!("{target} did not get ready"));
+            self.moves.remove(key);
+            let until = now + self.not_back_for(key);
+            self.left.insert((key.clone(), target.clone()), until);
+            let Some((version, assignment)) = self.wanted(key) else { continue };
+            let value = Assignment { standbys: Vec::new(), ..assignment.clone() };
+            let version = Version { revision: version.revision + 1, ..self.next_version(version) };
+            records.push(record(key, version, value));
+        }
+        self.mint(records, None);
+    }
+
+    fn finish_moves(&mut self, now: Instant) {
+        let done: Vec<(ComponentKey, MoveWatch)> = self
+            .moves
+            .iter()
+            .filter(|(key, watch)| {
+                let epoch = watch.epoch.as_ref();
+                epoch.is_some_and(|epoch| self.switched(key, epoch)) || self.home(key).is_none()
+            })
+            .map(|(key, watch)| (key.clone(), watch.clone()))
+            .collect();
+        for (key, watch) in done {
+            self.moves.remove(&key);
+            let Some(home) = self.home(&key).cloned() else { continue };
+            if let Some(from) = watch.from {
+                let until = now + self.not_back_for(&key);
+                self.left.insert((key.clone(), from.clone()), until);
+                let text = format!("{from} -> {home}");
+                let event = Event::new("moved", &self.me, text).about(&key);
+                let took = now.since(watch.since).as_secs_f64() * 1000.0;
+                self.push_event(event.number("took_ms", took));
+            }
+        }
+        self.left.retain(|_, until| now < *until);
+    }
+
+    fn not_back_for(&self, key: &ComponentKey) -> Duration {
+        let engine = self.systems.get(&key.system).and_then(|s| self.make_engine(&s.recovery));
+        engine.map_or(Duration::ZERO, |engine| engine.recovery.not_back_for())
+    }
+
+    /// An assignment under a new epoch.
+    fn new_home(
+        &self,
+        key: &ComponentKey,
+        home: &RobotId,
+        reason: alloc::string::String,
+    ) -> Option<FleetRecord> {
+        let deployment = self.systems.get(&key.system)?.revision;
+        let before = self.assignment(key).map(|(version, old)| (version.clone(), old.clone()));
+        let epoch = match &before {
+            Some((Version { epoch: Some(epoch), .. }, _)) => epoch.next(&self.me),
+            Some(_) | None => Epoch::first(&self.me),
+        };
+        let drains = before.map(|(_, old)| old.home).filter(|old| old != home);
+        let value = Assignment {
+            component: key.clone(),
+            home: home.clone(),
+            standbys: Vec::new(),
+            drains,
+            deployment,
+            reason,
+        };
+        let version =
+            Version { epoch: Some(epoch), revision: 0, term: self.term(), author: self.me.clone() };
+        Some(record(key, version, value))
+    }
+
+    fn with_standby(&self, placement: &Placement, reason: &str) -> Option<FleetRecord> {
+        let (version, assignment) = self.wanted(&placement.component)?;
+        let value = Assignment {
+            standbys: vec![placement.robot.clone()],
+            reason: reason.into(),
+            ..assignment.clone()
+        };
+        let version = Version { revision: version.revision + 1, ..self.next_version(version) };
+        Some(record(&placement.component, version, value))
+    }
+
+    /// `version` as this coordinator continues it.
+    fn next_version(&self, version: &Version) -> Version {
+        Version { term: self.term(), author: self.me.clone(), ..version.clone() }
+    }
+
+    pub(super) fn move_deadlines(&self) -> impl Iterator<Item = Instant> {
+        let preparing = self.moves.values().filter(|watch| watch.epoch.is_none());
+        preparing.map(|watch| watch.since + self.config.prepare_max)
+    }
+}
+
+fn record(key: &ComponentKey, version: Version, value: Assignment) -> FleetRecord {
+    let value = FleetValue::Assignment(value);
+    FleetRecord::new(RecordKind::ASSIGNMENT, key.to_string(), version, &value)
+}

@@ -1,0 +1,170 @@
+//! From beliefs to a problem for an allocator.
+
+use alloc::{collections::BTreeMap, string::String, vec::Vec};
+
+use super::{Brain, systems::SystemNow};
+use crate::{
+    allocate::{Item, Pair, Problem, RobotOffer, Settled, Tier, Wire},
+    id::{ComponentKey, Name, RobotId},
+    report::{InstanceReport, Report},
+    spec::{ComponentSpec, Needs, launch_hash},
+};
+
+/// Robots a component must not go to, with reasons.
+pub(super) type Avoid = Vec<(RobotId, String)>;
+
+impl Brain {
+    /// The question where to put `names` of `system`.
+    pub(super) fn problem(
+        &self,
+        system: &SystemNow,
+        names: &[Name],
+        tier: Tier,
+        avoid: &BTreeMap<Name, Avoid>,
+    ) -> Problem {
+        let keys: Vec<ComponentKey> = names.iter().map(|name| system.key(name)).collect();
+        let robots = self.alive_robots();
+        let chosen = system.components.iter().filter(|component| names.contains(&component.name));
+        let items = chosen
+            .map(|spec| {
+                let component = system.key(&spec.name);
+                let running = |robot: &&RobotId| self.instance_report(robot, &component).is_some();
+                Item {
+                    needs: self.needs(system, spec),
+                    launch: launch_hash(spec.launch.name()),
+                    devices: spec.devices.clone(),
+                    place: spec.place.clone(),
+                    running_on: robots.iter().filter(running).cloned().collect(),
+                    avoid: avoid.get(&spec.name).cloned().unwrap_or_default(),
+                    component,
+                }
+            })
+            .collect();
+        let settled = system.components.iter().filter(|spec| !names.contains(&spec.name));
+        Problem {
+            tier,
+            policy: system.allocation.clone(),
+            receiver: system.receiver.clone(),
+            robots: robots.iter().filter_map(|robot| self.offer(robot, &keys)).collect(),
+            items,
+            settled: settled
+                .filter_map(|spec| {
+                    let home = self.home(&system.key(&spec.name))?.clone();
+                    Some(Settled { name: spec.name.clone(), home })
+                })
+                .collect(),
+            connections: system
+                .connections
+                .iter()
+                .map(|c| Wire { from: c.from.component.clone(), to: c.to.component.clone() })
+                .collect(),
+            pairs: self.pairs(&robots),
+        }
+    }
+
+    /// The larger of declared and measured need.
+    fn needs(&self, system: &SystemNow, spec: &ComponentSpec) -> Needs {
+        let key = system.key(&spec.name);
+        let measured = self.home(&key).and_then(|home| self.instance_report(home, &key));
+        match measured {
+            Some(report) => Needs {
+                memory: spec.needs.memory.max(report.usage.memory),
+                cpu: spec.needs.cpu.max(report.usage.cpu),
+            },
+            None => spec.needs,
+        }
+    }
+
+    /// What a robot has left beside all that is or will be there, without `items`.
+    fn offer(&self, robot: &RobotId, items: &[ComponentKey]) -> Option<RobotOffer> {
+        let facts = self.facts(robot)?;
+        let host = self.host_of(robot).copied().unwrap_or_default();
+        let (mut memory, mut cpu) = (facts.memory_capacity, facts.cpu_capacity);
+        for needs in self.taken(robot, items) {
+            memory = memory.less(needs.memory);
+            cpu = cpu.less(needs.cpu);
+        }
+        Some(RobotOffer {
+            robot: robot.clone(),
+            memory_free: memory,
+            cpu_capacity: facts.cpu_capacity,
+            cpu_free: cpu,
+            battery: host.battery,
+            rssi: host.rssi,
+            position: host.position,
+            labels: facts.labels.clone(),
+            devices: facts.devices.clone(),
+            launchables: facts.launchables.clone(),
+        })
+    }
+
+    /// Needs of all that runs or will run on a robot, except `items` that will leave or come.
+    fn taken(&self, robot: &RobotId, items: &[ComponentKey]) -> Vec<Needs> {
+        let mut taken: BTreeMap<ComponentKey, Needs> = BTreeMap::new();
+        for report in self.instance_reports(robot) {
+            let usage = Needs { memory: report.usage.memory, cpu: report.usage.cpu };
+            taken.insert(report.component, usage);
+        }
+        for system in self.systems.values() {
+            for spec in &system.components {
+                let key = system.key(&spec.name);
+                let comes = self.wanted(&key).is_some_and(|(_, assignment)| {
+                    assignment.home == *robot || assignment.standbys.contains(robot)
+                });
+                if comes {
+                    let needs = taken.entry(key).or_default();
+                    needs.memory = needs.memory.max(spec.needs.memory);
+                    needs.cpu = needs.cpu.max(spec.needs.cpu);
+                }
+            }
+        }
+        taken.into_iter().filter(|(key, _)| !items.contains(key)).map(|(_, needs)| needs).collect()
+    }
+
+    fn pairs(&self, robots: &[RobotId]) -> Vec<Pair> {
+        let mut pairs: BTreeMap<(RobotId, RobotId), Pair> = BTreeMap::new();
+        for robot in robots {
+            let Some(author) = self.mesh.authors().author(robot) else { continue };
+            for report in author.reports() {
+                let Report::Link(other, link) = report else { continue };
+                let (a, b) = if robot < other { (robot, other) } else { (other, robot) };
+                let pair = pairs.entry((a.clone(), b.clone())).or_insert_with(|| Pair {
+                    a: a.clone(),
+                    b: b.clone(),
+                    jitter: None,
+                    delay: None,
+                    loss: None,
+                });
+                // the worse of both ends
+                pair.jitter = pair.jitter.max(Some(link.jitter));
+                pair.delay = pair.delay.max(Some(link.rtt / 2));
+                pair.loss = pair.loss.max(Some(link.loss));
+            }
+        }
+        pairs.into_values().collect()
+    }
+
+    /// What `robot` runs of a component; of this robot, as it is now.
+    pub(super) fn instance_report(
+        &self,
+        robot: &RobotId,
+        key: &ComponentKey,
+    ) -> Option<InstanceReport> {
+        match *robot == self.me {
+            true => self.current(key).map(|id| self.own_report(id)),
+            false => self.reported(robot, key).cloned(),
+        }
+    }
+
+    fn instance_reports(&self, robot: &RobotId) -> Vec<InstanceReport> {
+        if *robot == self.me {
+            return self.instances.keys().map(|id| self.own_report(*id)).collect();
+        }
+        let Some(author) = self.mesh.authors().author(robot) else { return Vec::new() };
+        let instances = author.reports().filter_map(|report| match report {
+            Report::Instance(instance) => Some(instance.clone()),
+            Report::Facts(_) | Report::Host(_) | Report::Link(..) | Report::Condition(_) => None,
+        });
+        instances.collect()
+    }
+}

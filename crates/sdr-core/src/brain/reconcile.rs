@@ -1,0 +1,174 @@
+//! Every robot's part: what should be here against what is.
+
+use alloc::{collections::BTreeSet, format, vec::Vec};
+
+use super::{Brain, instances::Told};
+use crate::{
+    effect::Command,
+    event::Event,
+    id::ComponentKey,
+    input::InstanceId,
+    lifecycle::LifecycleState,
+    order::{Epoch, Token},
+    time::Instant,
+};
+
+/// What this robot owes a component.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Duty {
+    /// Nothing.
+    None,
+    /// Run it, active under this epoch.
+    Home(Epoch),
+    /// Keep it prepared, inactive.
+    Standby,
+    /// It moved away as planned; go on until its consumers have switched.
+    Drain(Epoch),
+}
+
+impl Brain {
+    pub(super) fn reconcile(&mut self, now: Instant) {
+        self.update_readiness(now);
+        let wanted = self.systems.values().flat_map(|system| system.keys().collect::<Vec<_>>());
+        let running = self.instances.values().map(|instance| instance.component.clone());
+        let keys: BTreeSet<ComponentKey> = wanted.chain(running).collect();
+        for key in keys {
+            match self.duty(&key) {
+                Duty::None => self.leave(&key),
+                Duty::Home(epoch) => self.be_home(now, &key, &epoch),
+                Duty::Standby => self.be_standby(now, &key),
+                Duty::Drain(epoch) => self.drain(now, &key, &epoch),
+            }
+        }
+    }
+
+    pub(super) fn duty(&self, key: &ComponentKey) -> Duty {
+        let Some((version, assignment)) = self.wanted(key) else { return Duty::None };
+        let Some(epoch) = version.epoch.clone() else { return Duty::None };
+        if assignment.home == self.me {
+            Duty::Home(epoch)
+        } else if assignment.standbys.contains(&self.me) {
+            Duty::Standby
+        } else if assignment.drains.as_ref() == Some(&self.me) {
+            Duty::Drain(epoch)
+        } else {
+            Duty::None
+        }
+    }
+
+    fn be_home(&mut self, now: Instant, key: &ComponentKey, epoch: &Epoch) {
+        self.drains.remove(key);
+        let Some(id) = self.current(key) else {
+            self.launch_when_due(now, key);
+            return;
+        };
+        let shape = self.shape(key);
+        let instance = &self.instances[&id];
+        if shape.is_some_and(|shape| shape != instance.shape) {
+            self.event_about("respecified", key, "its spec or wiring changed");
+            self.finish(id);
+            return;
+        }
+        let fits = match &instance.told {
+            Told::Activate(token) => token.epoch == *epoch,
+            Told::Nothing | Told::Deactivate | Told::Finish => false,
+        };
+        let able = matches!(instance.state, LifecycleState::Inactive | LifecycleState::Active);
+        if !fits && able && self.predecessors_active(key) {
+            self.activate(id, key, epoch);
+        }
+    }
+
+    fn activate(&mut self, id: InstanceId, key: &ComponentKey, epoch: &Epoch) {
+        let Some(run) = self.next_run(key) else { return };
+        let token = Token { epoch: epoch.clone(), run };
+        self.instances.get_mut(&id).expect("listed by the caller").told =
+            Told::Activate(token.clone());
+        self.command(id, Command::Activate(token));
+    }
+
+    fn be_standby(&mut self, now: Instant, key: &ComponentKey) {
+        self.drains.remove(key);
+        let Some(id) = self.current(key) else {
+            self.launch_when_due(now, key);
+            return;
+        };
+        let instance = &self.instances[&id];
+        if self.shape(key).is_some_and(|shape| shape != instance.shape) {
+            self.finish(id);
+        } else if matches!(instance.told, Told::Activate(_)) {
+            self.instances.get_mut(&id).expect("listed above").told = Told::Deactivate;
+            self.command(id, Command::Deactivate);
+            self.event_about("fenced", key, "another robot is its home now");
+        }
+    }
+
+    /// The old home of a planned move ends once the new one is active and heard, or after
+    /// `drain_max`.
+    fn drain(&mut self, now: Instant, key: &ComponentKey, epoch: &Epoch) {
+        let Some(id) = self.current(key) else { return };
+        let since = *self.drains.entry(key.clone()).or_insert(now);
+        let late = now >= since + self.config.drain_max;
+        if late || self.switched(key, epoch) {
+            let reason = match late {
+                true => format!("drained for {} ms", now.since(since).as_millis()),
+                false => "the new home is active and heard".into(),
+            };
+            self.event_about("drained", key, reason);
+            self.forget_here(key);
+            self.finish(id);
+        }
+    }
+
+    fn leave(&mut self, key: &ComponentKey) {
+        self.drains.remove(key);
+        let Some(id) = self.current(key) else {
+            self.forget_here(key);
+            return;
+        };
+        let instance = &self.instances[&id];
+        let greater = self.wanted(key).and_then(|(version, _)| version.epoch.clone());
+        if let (Told::Activate(token), Some(epoch)) = (&instance.told, greater)
+            && epoch > token.epoch
+        {
+            let event = Event::new("fenced", &self.me, "a greater epoch lives elsewhere");
+            let event = event.about(key).under(token);
+            self.push_event(event);
+        }
+        self.forget_here(key);
+        self.finish(id);
+    }
+
+    /// Whether the home under `epoch` is active and all its living consumers heard it.
+    pub(super) fn switched(&self, key: &ComponentKey, epoch: &Epoch) -> bool {
+        let Some(home) = self.home(key) else { return false };
+        let under = |token: &Option<Token>| token.as_ref().is_some_and(|t| t.epoch >= *epoch);
+        let active = self
+            .instance_report(home, key)
+            .is_some_and(|report| report.state == LifecycleState::Active && under(&report.token));
+        active && self.consumers_heard(key, epoch)
+    }
+
+    /// Whether every consumer of a component, as far as it is active, heard this epoch.
+    pub(super) fn consumers_heard(&self, key: &ComponentKey, epoch: &Epoch) -> bool {
+        let Some(system) = self.systems.get(&key.system) else { return false };
+        let outgoing = system.connections.iter().filter(|c| c.from.component == key.name);
+        outgoing.into_iter().all(|connection| {
+            let consumer = system.key(&connection.to.component);
+            let Some(home) = self.home(&consumer) else { return true };
+            let Some(report) = self.instance_report(home, &consumer) else { return false };
+            let heard = report.heard.iter().find(|(index, _)| *index == connection.index);
+            heard.is_some_and(|(_, token)| token.epoch >= *epoch)
+        })
+    }
+
+    fn predecessors_active(&self, key: &ComponentKey) -> bool {
+        let Some(system) = self.systems.get(&key.system) else { return false };
+        let Some(spec) = system.component(&key.name) else { return false };
+        spec.after.iter().all(|before| {
+            let before = system.key(before);
+            let report = self.home(&before).and_then(|home| self.instance_report(home, &before));
+            report.is_some_and(|report| report.state == LifecycleState::Active)
+        })
+    }
+}

@@ -1,0 +1,171 @@
+//! What this robot says of itself, and how often.
+
+use alloc::{
+    collections::{BTreeMap, BTreeSet},
+    string::String,
+    vec::Vec,
+};
+
+use super::{Brain, judge::Calls};
+use crate::{
+    id::{ComponentKey, RobotId},
+    input::InstanceId,
+    mesh::{AuthorKey, Push},
+    report::{HostReport, InstanceReport, LinkReport, Report, Usage},
+    time::{Duration, Instant},
+    units::{Bytes, Permille},
+};
+
+/// Host figures are said at least so often.
+const HOST_PERIOD: Duration = Duration::from_secs(1);
+/// Links are said at most so often.
+const LINK_PERIOD: Duration = Duration::from_secs(2);
+/// A change of memory that is said at once.
+const MEMORY_STEP: Bytes = Bytes(8_000_000);
+/// A change of CPU that is said at once, thousandths of a core.
+const CPU_STEP: u32 = 100;
+/// A change of the radio that is said at once, tenths of a dBm.
+const RSSI_STEP: u16 = 10;
+
+/// What was said last, and what is worth saying again.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Said {
+    host: Option<(Instant, HostReport)>,
+    links_at: Option<Instant>,
+    instances: BTreeMap<ComponentKey, InstanceReport>,
+    restarts: BTreeMap<ComponentKey, u16>,
+    calls: Calls,
+}
+
+impl Said {
+    pub(super) fn count_restart(&mut self, key: &ComponentKey) {
+        let count = self.restarts.entry(key.clone()).or_default();
+        *count = count.saturating_add(1);
+    }
+
+    pub(super) fn note_condition(&mut self, key: &ComponentKey, reason: &str, now: Instant) {
+        self.calls.insert(key.clone(), (now, reason.into()));
+    }
+
+    /// Calls that waited for `wait`; each is given once.
+    pub(super) fn unanswered(&mut self, now: Instant, wait: Duration) -> Vec<ComponentKey> {
+        let late: Vec<ComponentKey> = self
+            .calls
+            .iter()
+            .filter(|(_, (since, _))| now.since(*since) >= wait)
+            .map(|(key, _)| key.clone())
+            .collect();
+        for key in &late {
+            self.calls.remove(key);
+        }
+        late
+    }
+}
+
+impl Brain {
+    pub(super) fn say_facts(&mut self) {
+        let facts = self.config.facts.clone();
+        self.mesh.report(&Report::Facts(facts), Push::WithGossip);
+    }
+
+    pub(super) fn say(&mut self, now: Instant) {
+        self.update_readiness(now);
+        self.say_instances();
+        self.say_host(now);
+        self.say_links(now);
+    }
+
+    fn say_host(&mut self, now: Instant) {
+        let Some(host) = self.host else { return };
+        let due = match &self.said.host {
+            None => true,
+            Some((at, before)) => now.since(*at) >= HOST_PERIOD || differs(before, &host),
+        };
+        if due {
+            self.said.host = Some((now, host));
+            self.mesh.report(&Report::Host(host), Push::WithGossip);
+        }
+    }
+
+    fn say_links(&mut self, now: Instant) {
+        if self.said.links_at.is_some_and(|at| now.since(at) < LINK_PERIOD) {
+            return;
+        }
+        self.said.links_at = Some(now);
+        let links: Vec<(RobotId, LinkReport)> =
+            self.mesh.links().map(|(robot, link)| (robot.clone(), link)).collect();
+        for (robot, link) in links {
+            self.mesh.report(&Report::Link(robot, link), Push::WithGossip);
+        }
+    }
+
+    /// States and tokens at once, figures when they changed enough.
+    fn say_instances(&mut self) {
+        let mut spoken: BTreeSet<ComponentKey> = BTreeSet::new();
+        let ids: Vec<InstanceId> = self.instances.keys().copied().collect();
+        for id in ids {
+            let mut report = self.own_report(id);
+            let key = report.component.clone();
+            if self.instances[&id].is_ending() && self.current(&key).is_some() {
+                continue;
+            }
+            spoken.insert(key.clone());
+            if let Some(before) = self.said.instances.get(&key) {
+                report.usage = settled_usage(before.usage, report.usage);
+                if *before == report {
+                    continue;
+                }
+            }
+            self.said.instances.insert(key, report.clone());
+            self.mesh.report(&Report::Instance(report), Push::Now);
+        }
+        let silent: Vec<ComponentKey> =
+            self.said.instances.keys().filter(|key| !spoken.contains(key)).cloned().collect();
+        for key in silent {
+            self.said.instances.remove(&key);
+            if self.home(&key) != Some(&self.me) {
+                self.said.restarts.remove(&key);
+            }
+            self.mesh.retract(&AuthorKey::instance(&key));
+        }
+    }
+
+    /// The report of an instance here, as it is now.
+    pub(super) fn own_report(&self, id: InstanceId) -> InstanceReport {
+        let instance = &self.instances[&id];
+        InstanceReport {
+            component: instance.component.clone(),
+            state: instance.state,
+            token: instance.token.clone(),
+            ready: instance.ready,
+            usage: instance.usage,
+            heard: instance.heard.iter().map(|(index, token)| (*index, token.clone())).collect(),
+            restarts: self.said.restarts.get(&instance.component).copied().unwrap_or(0),
+        }
+    }
+
+    /// Why a component called for help here.
+    pub(super) fn call_of(&self, key: &ComponentKey) -> Option<String> {
+        self.said.calls.get(key).map(|(_, reason)| reason.clone())
+    }
+}
+
+/// Keeps the figures said before while the new ones are close to them.
+fn settled_usage(before: Usage, now: Usage) -> Usage {
+    let memory = before.memory.0.abs_diff(now.memory.0) < MEMORY_STEP.0;
+    let cpu = before.cpu.0.abs_diff(now.cpu.0) < CPU_STEP;
+    if memory && cpu { before } else { now }
+}
+
+fn differs(before: &HostReport, now: &HostReport) -> bool {
+    let radio = match (before.rssi, now.rssi) {
+        (Some(before), Some(now)) => before.tenths().abs_diff(now.tenths()) >= RSSI_STEP,
+        (None, None) => false,
+        (Some(_), None) | (None, Some(_)) => true,
+    };
+    let battery = |host: &HostReport| host.battery.unwrap_or(Permille(0)).0 / 10;
+    before.memory_used.0.abs_diff(now.memory_used.0) >= MEMORY_STEP.0
+        || before.cpu_used.0.abs_diff(now.cpu_used.0) >= CPU_STEP
+        || radio
+        || battery(before) != battery(now)
+}
