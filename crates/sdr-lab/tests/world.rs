@@ -192,3 +192,48 @@ fn an_impossible_world_is_refused_with_the_reason() {
     assert!(start(&["a"], &deep).contains("a socket's path at most 107"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+#[test]
+fn the_seventeenth_client_is_refused_and_a_free_place_is_taken_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = world(folder.path());
+    let path = &world.paths()[0].camera;
+    let mut clients: Vec<CameraClient> =
+        (0..16).map(|_| CameraClient::connect(path, LIMIT).unwrap()).collect();
+
+    let (_stream, mut lines) = lines_of(path);
+    let mut rest = String::new();
+    lines.read_to_string(&mut rest).unwrap();
+
+    assert_eq!(rest, "{\"error\":\"16 clients already, hanging up\"}\n");
+    assert!(clients.iter_mut().all(|client| client.frame().is_ok()));
+    clients.clear();
+    while CameraClient::connect(path, LIMIT).and_then(|mut client| client.frame()).is_err() {}
+}
+
+#[test]
+fn garbage_and_readers_that_never_read_disturb_nobody() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = world(folder.path());
+    let mut noise = sdr_lab::noise::Noise::new(8);
+    let mut asleep = Vec::new();
+    for round in 0..40 {
+        let path = if round % 2 == 0 { &world.paths()[0].wheels } else { &world.paths()[0].camera };
+        let mut stream = UnixStream::connect(path).unwrap();
+        let bytes: Vec<u8> = (0..100).flat_map(|_| noise.bits().to_le_bytes()).collect();
+        // The device may hang up while the garbage is on its way.
+        let _ = stream.write_all(&bytes);
+        if round % 10 == 0 {
+            asleep.push(stream);
+        }
+    }
+
+    let mut wheels = WheelsClient::connect(&world.paths()[0].wheels, LIMIT).unwrap();
+    wheels.command(Command { linear: 0.1, angular: 0.0 }).unwrap();
+    let first = wheels.wait(LIMIT).unwrap()[0].sequence;
+    while wheels.wait(LIMIT).unwrap().last().unwrap().sequence < first + 20 {}
+    let mut camera = CameraClient::connect(&world.paths()[0].camera, LIMIT).unwrap();
+
+    assert!(camera.frame().is_ok());
+    assert_eq!(world.command_times("robot-2").unwrap().len(), 1);
+}
