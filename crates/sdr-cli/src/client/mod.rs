@@ -27,8 +27,8 @@ pub(crate) use stream::{Chunks, Events};
 
 /// Largest answer that is read whole.
 const ANSWER_BYTES_MAX: usize = 16 << 20;
-/// How long an agent may take for an answer; it never waits for a component before it answers.
-const ANSWER_WITHIN: Duration = Duration::from_secs(10);
+/// How long an agent may take for an answer: it gives its disk 10 s, and then says so itself.
+const ANSWER_WITHIN: Duration = Duration::from_secs(15);
 
 /// Speaks with one agent.
 #[derive(Clone, Debug)]

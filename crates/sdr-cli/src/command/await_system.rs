@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::{
     Session,
-    client::Client,
+    client::{Client, ClientError},
     failure::Failure,
     output::Format,
     render::{
@@ -123,6 +123,13 @@ impl Awaited {
     }
 }
 
+/// What a wait shows while the agent does not answer.
+pub(super) fn unanswered(error: &ClientError) -> Frame {
+    let text = error.to_string();
+    let head = format!("{}; asking again", text.lines().next().unwrap_or_default());
+    Frame { head, lines: Vec::new() }
+}
+
 /// What the wait shows of a system.
 fn frame(system: &str, view: Option<&SystemView>, awaited: Option<&Awaited>) -> Frame {
     let (Some(view), Some(awaited)) = (view, awaited) else {
@@ -175,13 +182,20 @@ pub(super) async fn wait(
     let limit = format!("of {} s", timeout.as_secs_f64());
     let since = Instant::now();
     let awaited = loop {
-        let status: StatusView = client.get("/v1/status").await?;
-        let view = status.systems.iter().find(|system| system.name == answer.system);
-        let awaited = Awaited::of(view, answer.revision);
-        progress.show(&session.output, frame(&answer.system, view, awaited.as_ref()), &limit)?;
-        let done = awaited.as_ref().is_some_and(Awaited::is_done);
-        if done || since.elapsed() >= timeout {
-            break awaited;
+        let late = since.elapsed() >= timeout;
+        match client.get::<StatusView>("/v1/status").await {
+            Ok(status) => {
+                let view = status.systems.iter().find(|system| system.name == answer.system);
+                let awaited = Awaited::of(view, answer.revision);
+                let frame = frame(&answer.system, view, awaited.as_ref());
+                progress.show(&session.output, frame, &limit)?;
+                if late || awaited.as_ref().is_some_and(Awaited::is_done) {
+                    break awaited;
+                }
+            }
+            Err(error) if late => return Err(error.into()),
+            // An agent that restarts goes on with what it stored.
+            Err(error) => progress.show(&session.output, unanswered(&error), &limit)?,
         }
         tokio::time::sleep(POLL_EVERY).await;
     };

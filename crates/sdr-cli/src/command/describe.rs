@@ -1,8 +1,9 @@
 //! Asks component executables what ports and parameters they have (`--describe`).
 
-use std::{path::Path, process::Stdio, time::Duration};
+use std::{collections::BTreeMap, path::Path, process::Stdio, time::Duration};
 
 use sdr_core::spec::{ComponentProfile, Launch, SystemSpec};
+use serde::Deserialize;
 use tokio::{io::AsyncReadExt, process::Command, time::timeout};
 
 use crate::locate;
@@ -11,6 +12,16 @@ use crate::locate;
 const DESCRIBE_WITHIN: Duration = Duration::from_secs(5);
 /// Longest description that is read.
 const DESCRIPTION_BYTES_MAX: u64 = 1 << 20;
+
+/// `GET /v1/components`: what the agent's own robot can launch.
+#[derive(Debug, Deserialize)]
+pub(super) struct ComponentsView {
+    /// What each executable says of itself.
+    pub(super) components: Vec<ComponentProfile>,
+    /// Executables that said nothing usable, and why.
+    #[serde(default)]
+    pub(super) undescribed: BTreeMap<String, String>,
+}
 
 /// Profiles of the system's executables in `folder`, and why others have none.
 pub(super) async fn profiles(

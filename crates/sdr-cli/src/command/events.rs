@@ -4,7 +4,16 @@ use std::process::ExitCode;
 
 use sdr_core::api::EventView;
 
-use crate::{Session, client::Client, failure::Failure, output::Format, render};
+use crate::{
+    Session,
+    client::Client,
+    failure::Failure,
+    output::Format,
+    render::{
+        event,
+        units::{one_line, shorten},
+    },
+};
 
 /// Arguments of `sdr events`.
 #[derive(Debug, clap::Args)]
@@ -41,17 +50,27 @@ pub(crate) async fn run(args: EventsArgs, session: &Session) -> Result<ExitCode,
     follow(&client, since, session).await
 }
 
-/// One line an event until the agent ends the stream.
-async fn follow(client: &Client, since: u64, session: &Session) -> Result<ExitCode, Failure> {
-    let mut events = client.events(&format!("/v1/events?since={since}&follow=true")).await?;
-    while let Some(message) = events.next().await? {
-        match serde_json::from_str::<EventView>(&message.data) {
-            Ok(event) => show(&event, session)?,
-            Err(_) => session.output.note(&format!(
-                "sdr: the agent sent no event but {}: {}",
-                if message.kind.is_empty() { "this" } else { &message.kind },
-                render::units::shorten(&render::units::one_line(&message.data), 60)
-            ))?,
+/// One line an event until the agent stops. A stream that we were too slow for is taken up
+/// again where it broke off; what the agent no longer keeps is counted by the gap.
+async fn follow(client: &Client, mut since: u64, session: &Session) -> Result<ExitCode, Failure> {
+    let mut fell_behind = true;
+    while std::mem::take(&mut fell_behind) {
+        let mut events = client.events(&format!("/v1/events?since={since}&follow=true")).await?;
+        while let Some(message) = events.next().await? {
+            match serde_json::from_str::<EventView>(&message.data) {
+                Ok(event) => {
+                    tell_gap(since, event.sequence, session)?;
+                    since = event.sequence;
+                    show(&event, session)?;
+                }
+                Err(_) if message.kind == "lagged" => fell_behind = true,
+                Err(error) => {
+                    return Err(Failure::new(format!(
+                        "the agent sent what is no event: {error}\n  It begins: {}",
+                        shorten(&one_line(&message.data), 60)
+                    )));
+                }
+            }
         }
     }
     Err(Failure::new(format!(
@@ -60,9 +79,17 @@ async fn follow(client: &Client, since: u64, session: &Session) -> Result<ExitCo
     )))
 }
 
-fn show(event: &EventView, session: &Session) -> Result<(), Failure> {
+/// Says how many events are missing between two.
+fn tell_gap(before: u64, next: u64, session: &Session) -> Result<(), Failure> {
+    match next.saturating_sub(before) {
+        0 | 1 => Ok(()),
+        step => session.output.note(&format!("sdr: {} events are missing here", step - 1)),
+    }
+}
+
+fn show(view: &EventView, session: &Session) -> Result<(), Failure> {
     match session.output.format() {
-        Format::Text => session.output.line(&render::event::line(event)),
-        Format::Json => session.output.json(event),
+        Format::Text => session.output.line(&event::line(view)),
+        Format::Json => session.output.json(view),
     }
 }

@@ -8,7 +8,10 @@ use std::{
 use sdr_core::{api::StatusView, id::Name};
 use serde::Serialize;
 
-use super::{await_system::POLL_EVERY, duration};
+use super::{
+    await_system::{POLL_EVERY, unanswered},
+    duration,
+};
 use crate::{
     Session,
     client::Client,
@@ -63,20 +66,28 @@ async fn wait(client: &Client, args: &UndeployArgs, session: &Session) -> Result
     let limit = format!("of {} s", args.timeout.as_secs_f64());
     let since = Instant::now();
     loop {
-        let view: StatusView = client.get("/v1/status").await?;
-        let left = left(&view, args.system.as_str());
+        let late = since.elapsed() >= args.timeout;
+        let left = match client.get::<StatusView>("/v1/status").await {
+            Ok(view) => left(&view, args.system.as_str()),
+            Err(error) if late => return Err(error.into()),
+            Err(error) => {
+                progress.show(&session.output, unanswered(&error), &limit)?;
+                tokio::time::sleep(POLL_EVERY).await;
+                continue;
+            }
+        };
         let gone = left.is_empty();
         let head = match gone {
             true => format!("{}: gone", args.system),
-            false => format!("{}: {} still there", args.system, left.len()),
+            false => format!("{}: waiting for its components to end", args.system),
         };
         progress.show(&session.output, Frame { head, lines: left.clone() }, &limit)?;
         if gone {
             return Ok(true);
         }
-        if since.elapsed() >= args.timeout {
-            let text = format!("sdr: {} is not gone after {limit}", args.system);
-            session.output.note(&text.replace("after of", "after"))?;
+        if late {
+            let seconds = args.timeout.as_secs_f64();
+            session.output.note(&format!("sdr: {} is not gone after {seconds} s", args.system))?;
             for line in left {
                 session.output.note(&format!(" {line}"))?;
             }

@@ -171,15 +171,14 @@ fn system_head(system: &SystemView) -> String {
     )
 }
 
-fn components(system: &SystemView) -> Table<7> {
-    let mut table = Table::new(["COMPONENT", "HOME", "STATE", "EPOCH", "RUN", "MEMORY", "NOTE"]);
+fn components(system: &SystemView) -> Table<6> {
+    let mut table = Table::new(["COMPONENT", "HOME", "STATE", "EPOCH", "MEMORY", "NOTE"]);
     for component in &system.components {
         table.row([
             component.name.clone(),
             component.home.clone().unwrap_or_else(|| NOTHING.into()),
             component.state.map_or_else(|| NOTHING.into(), |state| state.to_string()),
             component.epoch.to_string(),
-            component.run.to_string(),
             format!("{:>7}", megabytes(component.memory_bytes)),
             component_note(component),
         ]);
@@ -189,6 +188,9 @@ fn components(system: &SystemView) -> Table<7> {
 
 fn component_note(component: &ComponentView) -> String {
     let mut parts = Vec::new();
+    if component.run > 1 {
+        parts.push(format!("run {}", component.run));
+    }
     if component.restarts > 0 {
         parts.push(count(usize::try_from(component.restarts).unwrap_or(usize::MAX), "restart"));
     }

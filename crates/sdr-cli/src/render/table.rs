@@ -43,6 +43,6 @@ mod tests {
         table.row(["robot-1".into(), "short".into()]);
         table.row(["r".into(), "a note that is longer than the line".into()]);
         let lines = table.lines(24);
-        assert_eq!(lines, ["ROBOT    NOTE", "robot-1  short", "r        a note that ..."]);
+        assert_eq!(lines, ["ROBOT    NOTE", "robot-1  short", "r        a note that..."]);
     }
 }

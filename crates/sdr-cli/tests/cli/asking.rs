@@ -129,6 +129,18 @@ fn followed_events_go_on_where_the_list_ended() {
 }
 
 #[test]
+fn a_reader_that_was_too_slow_is_told_what_is_missing() {
+    let lagged = format!("data: {}\n\nevent: lagged\ndata: 5\n\n", event(1));
+    let agent = Agent::new()
+        .on_text("GET /v1/events?since=0&follow=true", 200, &lagged)
+        .on_text("GET /v1/events?since=1&follow=true", 200, &format!("data: {}\n\n", event(7)))
+        .on("GET /v1/events?since=0", 200, &json!([]));
+    let run = sdr(&["events", "-f", "--agent", &agent.socket()]);
+    assert_eq!(run.stdout.lines().count(), 2);
+    assert!(run.stderr.starts_with("sdr: 5 events are missing here\n"), "{}", run.stderr);
+}
+
+#[test]
 fn logs_are_fetched_from_the_home_robots_agent() {
     let home = Agent::new().on_text("GET /v1/logs/moon/camera", 200, "one\ntwo\n");
     let answer = json!({

@@ -17,17 +17,17 @@ fn a_fleet_that_is_well_is_shown_in_eighty_columns() {
 3 robots, 1 system      seen from robot-2, coordinator, term 1
 
 ROBOT    SEEN   CPU    FREE MEM  BATTERY  RSSI     ROLE         NOTE
-robot-1  0.3 s   38 %  1898 MB   81 %     -55.0 !  -            rssi-low 14 s
-robot-2  here    38 %   841 MB   81 %     -47.1    coordinator
-robot-3  0.3 s   38 %   312 MB   81 %     -46.8    -
+robot-1  0.3 s   38 %   1898 MB  81 %     -55.0 !  -            rssi-low 14 s
+robot-2  here    38 %    841 MB  81 %     -47.1    coordinator
+robot-3  0.3 s   38 %    312 MB  81 %     -46.8    -
 
 SYSTEM exploration   revision 1   5 of 5 active   5 of 5 connections heard
-COMPONENT   HOME     STATE   EPOCH  RUN  MEMORY   NOTE
-fisheye     robot-3  active  2      1     530 MB  moved from robot-1: rssi-low
-anomaly     robot-3  active  2      1     530 MB  moved from robot-1: rssi-low
-camera      robot-2  active  1      1     530 MB  robot-1: memory_free 310 MB...
-controller  robot-2  active  1      1     530 MB  robot-1: memory_free 310 MB...
-position    robot-3  active  1      1     530 MB  robot-2: memory_free 310 MB...
+COMPONENT   HOME     STATE   EPOCH  MEMORY   NOTE
+fisheye     robot-3  active  2       530 MB  moved from robot-1: rssi-low
+anomaly     robot-3  active  2       530 MB  moved from robot-1: rssi-low
+camera      robot-2  active  1       530 MB  robot-1: memory_free 310 MB, bar...
+controller  robot-2  active  1       530 MB  robot-1: memory_free 310 MB, bar...
+position    robot-3  active  1       530 MB  robot-2: memory_free 310 MB, bar...
 
 why: sdr events -n 20";
     let view = fixture::fleet();

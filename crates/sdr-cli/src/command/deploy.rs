@@ -1,0 +1,44 @@
+//! `sdr deploy`: check a system file, hand it to an agent, and wait when told so.
+
+use std::{path::PathBuf, process::ExitCode, time::Duration};
+
+use sdr_core::{
+    api::{DeployAnswer, DeployRequest},
+    spec::{ComponentProfile, SystemSpec},
+};
+use sdr_files::Problems;
+
+use super::{await_system, duration, problems};
+use crate::{Session, client::Client, failure::Failure};
+
+/// Arguments of `sdr deploy`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct DeployArgs {
+    /// System file
+    file: PathBuf,
+    /// Wait until every component is active and every connection heard
+    #[arg(long)]
+    wait: bool,
+    /// How long to wait at most
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration::parse)]
+    timeout: Duration,
+}
+
+/// Checks the file whole before anything is sent.
+pub(crate) async fn run(args: DeployArgs, session: &Session) -> Result<ExitCode, Failure> {
+    let loaded = match sdr_files::load_system(&args.file) {
+        Ok(loaded) => loaded,
+        Err(found) => return refuse(&found, session),
+    };
+    let client = Client::of(session)?;
+    let profiles: Vec<ComponentProfile> = client.get("/v1/components").await?;
+    let system = match linked(loaded, &profiles) {
+        Ok(system) => system,
+        Err(found) => return refuse(&found, session),
+    };
+    let answer: DeployAnswer = client.post("/v1/deploy", &DeployRequest { system }).await?;
+    match args.wait {
+        true => await_system::wait(&client, &answer, args.timeout, session).await,
+        false => await_system::accepted(&answer, session),
+    }
+}
