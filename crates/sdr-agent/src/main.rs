@@ -1,2 +1,168 @@
-//! Stub.
-fn main() {}
+//! The robot's agent: one loop round the brain, and thin drivers.
+//!
+//! ```text
+//!   metrics ─┐                                   ┌─▶ mesh, store, supervisor, data
+//!   mesh ────┼─▶ Input ─▶ brain ─▶ Effect ───────┤
+//!   api ─────┤   (run)    (sdr-core)  (effects)  └─▶ api, events, recording
+//!   outcomes ┘◀─────────────── what came of it ──────┘
+//! ```
+//!
+//! All decisions are made by [`sdr_core::brain::Brain`]; nothing here decides.
+
+mod api;
+mod clock;
+mod config;
+mod data;
+mod effects;
+mod events;
+mod memory;
+mod mesh;
+mod metrics;
+mod plan;
+mod record;
+mod run;
+mod store;
+mod supervisor;
+mod taps;
+mod trouble;
+mod world;
+
+use std::error::Error;
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+use sdr_files::RobotConfig;
+use sdr_files::robot::{LogFormat, Places};
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::watch;
+use tokio::task::LocalSet;
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::ParseError;
+
+use world::World;
+
+/// Shared memory and sockets of many components need more than the usual 1024 descriptors.
+const DESCRIPTORS: u64 = 65_536;
+/// Exit status of a wrong command line or robot.toml.
+const USAGE: u8 = 2;
+
+/// Runs one robot's part of a fleet.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+struct Arguments {
+    /// The robot's file [default: /etc/sdr/robot.toml, or the user's sdr/robot.toml]
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Check the file, say what is wrong with it, and end
+    #[arg(long)]
+    check: bool,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let file = arguments.config.unwrap_or_else(|| Places::of_this_process().robot_file());
+    let robot = match sdr_files::load_robot(&file) {
+        Ok(robot) => robot,
+        Err(problems) => return fail(&problems.to_string(), USAGE),
+    };
+    if arguments.check {
+        let said = writeln!(io::stdout(), "{}: fine, robot {}", file.display(), robot.name);
+        return if said.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+    }
+    if let Err(error) = start_log(&robot) {
+        return fail(&format!("{}: [log] level: {error}", file.display()), USAGE);
+    }
+    end_with_any_panic();
+    raise_descriptors();
+    match serve(&robot) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => fail(&chain(&*error), 1),
+    }
+}
+
+fn serve(robot: &RobotConfig) -> Result<(), Box<dyn Error>> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    LocalSet::new().block_on(&runtime, async {
+        let stop = stop_signals()?;
+        let (brain, mut world) = World::start(robot).await?;
+        run::run(brain, &mut world, stop).await;
+        world.stop().await;
+        Ok(())
+    })
+}
+
+/// Turns true with SIGTERM or SIGINT; the second one ends the process at once.
+fn stop_signals() -> io::Result<watch::Receiver<bool>> {
+    let (stop, stopped) = watch::channel(false);
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    tokio::task::spawn_local(async move {
+        for patience in [true, false] {
+            tokio::select! {
+                _ = terminate.recv() => {}
+                _ = interrupt.recv() => {}
+            }
+            if !patience {
+                std::process::exit(1);
+            }
+            // The loop may have ended by itself.
+            let _ = stop.send(true);
+        }
+    });
+    Ok(stopped)
+}
+
+fn start_log(robot: &RobotConfig) -> Result<(), ParseError> {
+    let level = std::env::var("RUST_LOG").unwrap_or_else(|_| robot.log.level.clone());
+    let filter = EnvFilter::try_new(level)?;
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr);
+    match robot.log.format {
+        LogFormat::Text => log.with_ansi(rustix::termios::isatty(io::stderr())).init(),
+        LogFormat::Json => log.json().init(),
+    }
+    Ok(())
+}
+
+/// A broken invariant on any thread ends the agent: components go on, and the next agent
+/// starts from the disk. Limping on would be worse.
+fn end_with_any_panic() {
+    let say = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        say(panic);
+        std::process::exit(101);
+    }));
+}
+
+fn raise_descriptors() {
+    let Rlimit { current, maximum } = getrlimit(Resource::Nofile);
+    let wanted = maximum.map_or(DESCRIPTORS, |maximum| maximum.min(DESCRIPTORS));
+    if current.is_some_and(|current| current < wanted) {
+        let raised = Rlimit { current: Some(wanted), maximum };
+        if let Err(error) = setrlimit(Resource::Nofile, raised) {
+            tracing::warn!(event = "descriptors-not-raised", wanted, %error);
+        }
+    }
+}
+
+fn fail(reason: &str, status: u8) -> ExitCode {
+    // Nobody reads it when stderr is closed.
+    let _ = writeln!(io::stderr(), "sdr-agent: {reason}");
+    ExitCode::from(status)
+}
+
+/// The error with its causes, those that it does not name itself.
+fn chain(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let said = error.to_string();
+        if !text.contains(&said) {
+            text = format!("{text}: {said}");
+        }
+        cause = error.source();
+    }
+    text
+}

@@ -1,0 +1,72 @@
+//! Systems come and go.
+
+use std::time::Duration;
+
+use axum::Json;
+use axum::body::Bytes;
+use axum::extract::rejection::BytesRejection;
+use axum::extract::{Path, State};
+use axum::http::StatusCode;
+use sdr_core::{
+    api::{DeployAnswer, DeployRequest},
+    id::Name,
+    input::{Input, RequestId},
+};
+
+use super::answer::Refusal;
+use super::{ApiState, BODY_BYTES_MAX};
+
+/// How long the brain and the disk have to accept a system.
+const ANSWER_MAX: Duration = Duration::from_secs(10);
+
+pub(super) async fn deploy(
+    State(state): State<ApiState>,
+    body: Result<Bytes, BytesRejection>,
+) -> Result<Json<DeployAnswer>, Refusal> {
+    let body = body.map_err(|rejection| match rejection.status() {
+        StatusCode::PAYLOAD_TOO_LARGE => Refusal::new(
+            StatusCode::PAYLOAD_TOO_LARGE,
+            format!("the body is larger than {BODY_BYTES_MAX} bytes"),
+        ),
+        _ => Refusal::bad(&state, rejection.body_text()),
+    })?;
+    let request: DeployRequest = serde_json::from_slice(&body).map_err(|error| {
+        Refusal::bad(&state, format!("body of /v1/deploy: {error}; wanted {{\"system\": ...}}"))
+    })?;
+    if let Err(error) = request.system.check() {
+        let error = format!("system `{}`: {error}", request.system.name);
+        return Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, error));
+    }
+    ask(&state, |request_id| Input::Deploy { request: request_id, system: request.system }).await
+}
+
+pub(super) async fn undeploy(
+    State(state): State<ApiState>,
+    Path(word): Path<String>,
+) -> Result<Json<DeployAnswer>, Refusal> {
+    let system = Name::new(&word).map_err(|error| Refusal::bad(&state, error.to_string()))?;
+    ask(&state, |request| Input::Undeploy { request, system }).await
+}
+
+/// Puts a wish to the brain and waits for its answer, which comes when it is on disk.
+async fn ask(
+    state: &ApiState,
+    wish: impl FnOnce(RequestId) -> Input,
+) -> Result<Json<DeployAnswer>, Refusal> {
+    let (request, answer) = state.desk.open();
+    let asked = async {
+        state.inputs.send(wish(request)).await.map_err(|_| Refusal::stopping())?;
+        answer.await.map_err(|_| Refusal::stopping())
+    };
+    let answered = tokio::time::timeout(ANSWER_MAX, asked).await;
+    state.desk.close(request);
+    match answered {
+        Ok(Ok(Ok(answer))) => Ok(Json(answer)),
+        Ok(Ok(Err(sentence))) => Err(Refusal::new(StatusCode::CONFLICT, sentence)),
+        Ok(Err(refusal)) => Err(refusal),
+        Err(_elapsed) => Err(Refusal::new(
+            StatusCode::GATEWAY_TIMEOUT,
+            format!("not accepted within {} s; the disk may be slow", ANSWER_MAX.as_secs()),
+        )),
+    }
+}

@@ -1,0 +1,182 @@
+//! HTTP and JSON on a Unix socket, for `sdr` and for programs on this robot.
+
+mod answer;
+mod components;
+mod deploy;
+mod events;
+mod logs;
+mod views;
+
+use std::collections::BTreeMap;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::{fs, io};
+
+use axum::Router;
+use axum::extract::DefaultBodyLimit;
+use axum::routing::{delete, get, post};
+use sdr_core::{
+    api::{DeployAnswer, PlanView, StatusView},
+    id::RobotId,
+    input::{Input, RequestId},
+};
+use thiserror::Error;
+use tokio::net::{UnixListener, UnixStream};
+use tokio::sync::{mpsc, oneshot};
+use tokio::task::JoinHandle;
+
+use crate::events::Events;
+use crate::record::Flusher;
+use crate::supervisor::LogFiles;
+use crate::trouble::Trouble;
+pub(crate) use components::Profiles;
+
+/// Largest body of a request, bytes.
+const BODY_BYTES_MAX: usize = 1 << 20;
+
+/// A question that only the loop can answer, since it holds the brain.
+#[derive(Debug)]
+pub(crate) struct StatusQuestion(pub(crate) oneshot::Sender<StatusView>);
+
+/// What the API needs of the rest of the agent.
+#[derive(Clone, Debug)]
+pub(crate) struct ApiState {
+    pub(crate) robot: RobotId,
+    pub(crate) inputs: mpsc::Sender<Input>,
+    pub(crate) questions: mpsc::Sender<StatusQuestion>,
+    pub(crate) desk: AnswerDesk,
+    pub(crate) events: Events,
+    pub(crate) trouble: Trouble,
+    pub(crate) plan: LatestPlan,
+    pub(crate) logs: LogFiles,
+    /// `None` when nothing is recorded.
+    pub(crate) recording: Option<Flusher>,
+    pub(crate) profiles: Profiles,
+}
+
+/// The plan that was made last, empty before the first.
+pub(crate) type LatestPlan = Arc<Mutex<PlanView>>;
+
+/// Requests that wait for [`sdr_core::effect::Effect::Answer`].
+#[derive(Clone, Debug, Default)]
+pub(crate) struct AnswerDesk(Arc<Mutex<Waiting>>);
+
+type Answer = Result<DeployAnswer, String>;
+
+#[derive(Debug, Default)]
+struct Waiting {
+    last: RequestId,
+    open: BTreeMap<RequestId, oneshot::Sender<Answer>>,
+}
+
+/// Why the API does not listen. The operator can mend it; nothing else was started.
+#[derive(Debug, Error)]
+pub(crate) enum ApiError {
+    /// An agent runs on this robot already.
+    #[error("{}: another agent answers there; one robot has one agent", .0.display())]
+    Taken(PathBuf),
+    /// The system refused.
+    #[error("{}: {source}", path.display())]
+    Socket {
+        /// The socket.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// The running server.
+#[derive(Debug)]
+pub(crate) struct Api {
+    path: PathBuf,
+    server: JoinHandle<()>,
+}
+
+impl Api {
+    /// Serves requests on `listener`, which was opened at `path`.
+    pub(crate) fn start(path: PathBuf, listener: UnixListener, state: ApiState) -> Self {
+        let server = tokio::spawn(async move {
+            if let Err(error) = axum::serve(listener, router(state)).await {
+                tracing::error!(event = "api-lost", %error, next = "restart the agent");
+            }
+        });
+        Self { path, server }
+    }
+
+    /// Ends all connections and removes the socket.
+    pub(crate) fn stop(&self) {
+        self.server.abort();
+        if let Err(error) = fs::remove_file(&self.path) {
+            tracing::debug!(event = "socket-left", path = %self.path.display(), %error);
+        }
+    }
+}
+
+impl AnswerDesk {
+    /// A number for a new request, and where its answer will come.
+    fn open(&self) -> (RequestId, oneshot::Receiver<Answer>) {
+        let (sender, receiver) = oneshot::channel();
+        let mut waiting = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        waiting.last += 1;
+        let request = waiting.last;
+        waiting.open.insert(request, sender);
+        (request, receiver)
+    }
+
+    /// Nobody waits for it any more.
+    fn close(&self, request: RequestId) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).open.remove(&request);
+    }
+
+    /// Answers a request; nothing happens when its client has gone.
+    pub(crate) fn answer(&self, request: RequestId, answer: Answer) {
+        let mut waiting = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(client) = waiting.open.remove(&request) {
+            // The client may go at this very moment.
+            let _ = client.send(answer);
+        }
+    }
+}
+
+/// Opens the socket at `path` for its user and group. What a dead agent left is replaced.
+pub(crate) async fn open(path: &Path) -> Result<UnixListener, ApiError> {
+    if UnixStream::connect(path).await.is_ok() {
+        return Err(ApiError::Taken(path.into()));
+    }
+    bind(path).map_err(|source| ApiError::Socket { path: path.into(), source })
+}
+
+fn bind(path: &Path) -> io::Result<UnixListener> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    match fs::remove_file(path) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) => return Err(error),
+    }
+    let listener = UnixListener::bind(path)?;
+    fs::set_permissions(path, fs::Permissions::from_mode(0o660))?;
+    Ok(listener)
+}
+
+fn router(state: ApiState) -> Router {
+    Router::new()
+        .route("/v1/status", get(views::status))
+        .route("/v1/health", get(views::health))
+        .route("/v1/plan", get(views::plan))
+        .route("/v1/recording", get(views::recording))
+        .route("/v1/deploy", post(deploy::deploy))
+        .route("/v1/systems/{name}", delete(deploy::undeploy))
+        .route("/v1/events", get(events::events))
+        .route("/v1/logs/{system}/{component}", get(logs::logs))
+        .route("/v1/components", get(components::components))
+        .fallback(answer::no_such_path)
+        .method_not_allowed_fallback(answer::wrong_method)
+        .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
+        .with_state(state)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,75 @@
+//! What the robot knows, at one moment.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::PoisonError;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use sdr_core::api::{PlanView, StatusView};
+use serde::Serialize;
+use tokio::sync::oneshot;
+
+use super::answer::Refusal;
+use super::{ApiState, StatusQuestion};
+
+/// `GET /v1/health`.
+#[derive(Debug, Serialize)]
+pub(super) struct HealthView {
+    /// The robot that answers.
+    robot: String,
+    /// The agent's version.
+    version: &'static str,
+    /// Its process.
+    pid: u32,
+    /// Bad input so far, by kind.
+    bad_input: BTreeMap<String, u64>,
+}
+
+/// `GET /v1/recording`.
+#[derive(Debug, Serialize)]
+pub(super) struct RecordingView {
+    /// The file; complete up to the moment of the request.
+    path: PathBuf,
+}
+
+pub(super) async fn status(State(state): State<ApiState>) -> Result<Json<StatusView>, Refusal> {
+    ask_status(&state).await.map(Json)
+}
+
+/// Asks the loop.
+pub(super) async fn ask_status(state: &ApiState) -> Result<StatusView, Refusal> {
+    let (sender, receiver) = oneshot::channel();
+    let question = StatusQuestion(sender);
+    state.questions.send(question).await.map_err(|_| Refusal::stopping())?;
+    receiver.await.map_err(|_| Refusal::stopping())
+}
+
+pub(super) async fn health(State(state): State<ApiState>) -> Json<HealthView> {
+    Json(HealthView {
+        robot: state.robot.to_string(),
+        version: env!("CARGO_PKG_VERSION"),
+        pid: std::process::id(),
+        bad_input: state.trouble.counters(),
+    })
+}
+
+pub(super) async fn plan(State(state): State<ApiState>) -> Json<PlanView> {
+    Json(state.plan.lock().unwrap_or_else(PoisonError::into_inner).clone())
+}
+
+pub(super) async fn recording(
+    State(state): State<ApiState>,
+) -> Result<Json<RecordingView>, Refusal> {
+    let Some(flusher) = state.recording else {
+        let error = "nothing is recorded; [storage] recordings of robot.toml turns it on";
+        return Err(Refusal::new(StatusCode::NOT_FOUND, error));
+    };
+    match tokio::task::spawn_blocking(move || flusher.flush()).await {
+        Ok(path) => Ok(Json(RecordingView { path })),
+        Err(error) => {
+            Err(Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, format!("not flushed: {error}")))
+        }
+    }
+}

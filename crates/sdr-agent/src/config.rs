@@ -1,0 +1,130 @@
+//! From robot.toml to what each driver needs.
+
+use std::collections::BTreeMap;
+use std::env;
+use std::path::PathBuf;
+
+use rand::TryRngCore as _;
+use rand::rngs::OsRng;
+use sdr_component::protocol::SharedMemory;
+use sdr_core::{
+    brain::BrainConfig, order::hash64, report::RobotFacts, spec::launch_hash, units::Bytes,
+};
+use sdr_files::RobotConfig;
+use sdr_files::robot::{BatterySource, PositionSource, RssiSource};
+
+use crate::metrics::{MetricsConfig, Radio, Sensors, host};
+use crate::supervisor::{LogFiles, Patience, SupervisorConfig, executables};
+
+/// Where Linux shows wireless interfaces.
+const WIRELESS: &str = "/proc/net/wireless";
+/// Where Linux shows batteries.
+const POWER_SUPPLY: &str = "/sys/class/power_supply";
+
+/// Folders with executables; beside the agent when robot.toml names none.
+pub(crate) fn component_path(config: &RobotConfig) -> Vec<PathBuf> {
+    if !config.components.path.is_empty() {
+        return config.components.path.clone();
+    }
+    let beside = env::current_exe().ok().and_then(|agent| agent.parent().map(PathBuf::from));
+    beside.into_iter().collect()
+}
+
+/// Names of this robot's shared memory: no two agents of a machine share them.
+pub(crate) fn shared_memory(config: &RobotConfig) -> SharedMemory {
+    let name = format!("{} {}", config.name, config.api.socket.display());
+    let hash = format!("{:016x}", hash64(name.as_bytes()));
+    let short = &hash[8..];
+    SharedMemory { prefix: format!("s{short}_"), root: format!("/dev/shm/sdr/{short}/").into() }
+}
+
+/// What components may use in all, as robot.toml or the machine says.
+pub(crate) fn memory_capacity(config: &RobotConfig) -> Bytes {
+    let of_machine = || host::memory().unwrap_or_default().less(config.capacity.reserve_memory);
+    config.capacity.memory.unwrap_or_else(of_machine)
+}
+
+/// The brain's, but for where the mesh listens.
+pub(crate) fn brain(config: &RobotConfig) -> BrainConfig {
+    let mut launchables: Vec<u32> =
+        executables(&component_path(config)).iter().map(|name| launch_hash(name)).collect();
+    launchables.sort_unstable();
+    let facts = RobotFacts {
+        memory_capacity: memory_capacity(config),
+        cpu_capacity: config.capacity.cpu.unwrap_or_else(host::cpu),
+        labels: config.labels.clone(),
+        devices: config.devices.iter().map(|device| device.name.clone()).collect(),
+        launchables,
+        role: config.coordinator,
+        api: config.api.socket.display().to_string(),
+        version: env!("CARGO_PKG_VERSION").into(),
+    };
+    BrainConfig {
+        fleet: config.mesh.fleet.clone(),
+        seeds: config.mesh.seeds.clone(),
+        seed: OsRng.try_next_u64().expect("the kernel always has randomness after boot"),
+        gossip_period: config.mesh.gossip_period,
+        gone_after: config.mesh.gone_after,
+        rejoin_wait: config.mesh.rejoin_wait,
+        ..BrainConfig::new(config.name.clone(), facts)
+    }
+}
+
+/// The sampler's.
+pub(crate) fn metrics(config: &RobotConfig) -> MetricsConfig {
+    let file = match &config.radio.rssi {
+        RssiSource::Auto => WIRELESS.into(),
+        RssiSource::File(path) => path.clone(),
+    };
+    let battery = config.sensors.battery.as_ref().and_then(|source| match source {
+        BatterySource::PowerSupply(name) => Some([POWER_SUPPLY, name, "capacity"].iter().collect()),
+        BatterySource::File(path) => Some(path.clone()),
+        BatterySource::Port(port) => unread("battery", &port.to_string()),
+    });
+    let position = config.sensors.position.as_ref().and_then(|source| match source {
+        PositionSource::File(path) => Some(path.clone()),
+        PositionSource::Port(port) => unread("position", &port.to_string()),
+    });
+    MetricsConfig {
+        period: config.radio.period,
+        memory_capacity: memory_capacity(config),
+        radio: Some(Radio { file, interface: config.radio.interface.clone() }),
+        sensors: Sensors { battery, position },
+    }
+}
+
+/// The supervisor's.
+pub(crate) fn supervisor(config: &RobotConfig) -> SupervisorConfig {
+    let devices: BTreeMap<String, String> = config
+        .devices
+        .iter()
+        .filter_map(|device| {
+            let path = device.path.as_ref()?;
+            Some((device.name.to_string(), path.display().to_string()))
+        })
+        .collect();
+    SupervisorConfig {
+        path: component_path(config),
+        socket: config.api.socket.with_extension("components.sock"),
+        state: config.storage.state.clone(),
+        logs: LogFiles {
+            dir: config.storage.logs.dir.clone(),
+            each_bytes_max: config.storage.logs.each.0,
+            bytes_max: config.storage.logs.max.0,
+        },
+        on_agent_death: config.components.on_agent_death,
+        devices,
+        memory: shared_memory(config),
+        patience: Patience::default(),
+    }
+}
+
+fn unread(sensor: &str, port: &str) -> Option<PathBuf> {
+    tracing::warn!(
+        event = "sensor-unread",
+        sensor,
+        port,
+        "figures from ports are not read by this version; {sensor} is unknown"
+    );
+    None
+}

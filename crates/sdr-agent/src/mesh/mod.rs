@@ -1,0 +1,3 @@
+//! The robot's ear and mouth for other robots.
+
+pub(crate) mod udp;

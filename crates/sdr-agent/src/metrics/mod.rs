@@ -1,0 +1,142 @@
+//! Figures of the robot and of what runs on it: the first step of a report's path.
+//!
+//! One thread samples /proc, the radio and the sensors; it sleeps in between and is woken
+//! when a component changes its state, so that memory is fresh exactly when it matters.
+
+pub(crate) mod host;
+pub(crate) mod process;
+mod radio;
+mod sampler;
+mod sensors;
+mod watch;
+
+use std::io;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use sdr_core::{input::Input, recording::RobotMetrics, report::HostReport, units::Bytes};
+use tokio::sync::mpsc;
+
+use crate::clock;
+use crate::record::{RecordSender, stamp};
+pub(crate) use radio::Radio;
+use sampler::{Sample, Sampler};
+pub(crate) use sensors::Sensors;
+pub(crate) use watch::Watch;
+
+/// Time between two reports of unchanged instances.
+const USAGE_PERIOD: Duration = Duration::from_secs(1);
+
+/// What is sampled, and how often.
+#[derive(Clone, Debug)]
+pub(crate) struct MetricsConfig {
+    /// Time between two samples.
+    pub(crate) period: Duration,
+    /// What components may use in all.
+    pub(crate) memory_capacity: Bytes,
+    /// Where the radio level is read.
+    pub(crate) radio: Option<Radio>,
+    /// Where the rest is read.
+    pub(crate) sensors: Sensors,
+}
+
+/// The sampling thread.
+#[derive(Debug)]
+pub(crate) struct Metrics {
+    watch: Watch,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Metrics {
+    /// Starts sampling; figures go to `inputs` and into the recording.
+    pub(crate) fn start(
+        config: MetricsConfig,
+        watch: Watch,
+        inputs: mpsc::Sender<Input>,
+        record: RecordSender,
+    ) -> io::Result<Self> {
+        let sampler = Sampler::new()?;
+        let desk = Desk { config, watch: watch.clone(), inputs, record, sampler };
+        let thread = thread::Builder::new().name("metrics".into()).spawn(move || desk.run())?;
+        Ok(Self { watch, thread: Some(thread) })
+    }
+}
+
+impl Drop for Metrics {
+    fn drop(&mut self) {
+        self.watch.close();
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread was printed already.
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Desk {
+    config: MetricsConfig,
+    watch: Watch,
+    inputs: mpsc::Sender<Input>,
+    record: RecordSender,
+    sampler: Sampler,
+}
+
+impl Desk {
+    fn run(mut self) {
+        let mut sample_at = clock::now();
+        let mut usage_at = clock::now();
+        while let Some(round) = self.watch.wait(sample_at) {
+            let now = clock::now();
+            if now >= sample_at {
+                // A late thread does not catch up with a burst.
+                sample_at = (sample_at + self.config.period).max(now);
+            }
+            let changed = !round.changed.is_empty();
+            let sample = self.sampler.sample(now, &round);
+            self.watch.keep(&sample.usage);
+            let host = self.report_host(&sample);
+            // A full queue means that the loop is busy; the next sample is near.
+            let _ = self.inputs.try_send(Input::Host(host));
+            if changed || sample.moved || now >= usage_at {
+                let _ = self.inputs.try_send(Input::Usage(sample.usage.clone()));
+            }
+            if now >= usage_at {
+                usage_at = now + USAGE_PERIOD;
+                self.watch.record_all(&self.record);
+            }
+        }
+    }
+
+    fn report_host(&self, sample: &Sample) -> HostReport {
+        let host = HostReport {
+            memory_used: sample.memory,
+            cpu_used: sample.cpu,
+            battery: self.config.sensors.battery(),
+            rssi: self.config.radio.as_ref().and_then(Radio::level),
+            position: self.config.sensors.position(),
+        };
+        let now = clock::now().as_nanos();
+        self.record.record(now, &self.message(now, &host, sample));
+        host
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "metres and per cent for plots")]
+    fn message(&self, now: u64, host: &HostReport, sample: &Sample) -> RobotMetrics {
+        let metres = |mm: i32| mm as f32 / 1000.0;
+        RobotMetrics {
+            stamp: stamp(),
+            monotonic_ns: now,
+            robot: self.record.robot().into(),
+            memory_capacity_bytes: self.config.memory_capacity.0,
+            memory_free_bytes: self.config.memory_capacity.less(host.memory_used).0,
+            memory_used_bytes: host.memory_used.0,
+            cpu_permille: host.cpu_used.0,
+            battery_percent: host.battery.map_or(f32::NAN, |battery| battery.0 as f32 / 10.0),
+            rssi_dbm: host.rssi.map_or(f32::NAN, |rssi| f32::from(rssi.tenths()) / 10.0),
+            x_m: host.position.map_or(f32::NAN, |position| metres(position.x_mm)),
+            y_m: host.position.map_or(f32::NAN, |position| metres(position.y_mm)),
+            agent_rss_bytes: sample.agent_resident.0,
+            agent_pss_bytes: sample.agent_memory.0,
+            agent_cpu_permille: sample.agent_cpu.0,
+        }
+    }
+}

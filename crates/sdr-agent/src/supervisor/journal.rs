@@ -1,0 +1,107 @@
+//! Which processes run, on disk, so that the next agent finds what this one left.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use sdr_core::input::InstanceId;
+use serde::{Deserialize, Serialize};
+
+use crate::metrics::process::parse_start_time;
+
+const FILE_NAME: &str = "processes.json";
+
+/// One process, named so that it cannot be mistaken for another.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Entry {
+    /// The component's key.
+    pub(super) component: String,
+    /// The instance it was.
+    pub(super) instance: InstanceId,
+    /// Its process, leader of its group.
+    pub(super) pid: u32,
+    /// When it started, ticks after boot.
+    pub(super) start_time: u64,
+    /// Of which boot.
+    pub(super) boot_id: String,
+    /// What it runs.
+    pub(super) executable: PathBuf,
+}
+
+/// The list on disk: replaced as a whole at each start and end. It need not survive a
+/// reboot, so nothing waits for the disk.
+#[derive(Debug)]
+pub(super) struct Journal {
+    path: PathBuf,
+    boot_id: String,
+    entries: RefCell<BTreeMap<InstanceId, Entry>>,
+}
+
+impl Journal {
+    /// An empty journal in `dir`; written with the first process.
+    pub(super) fn new(dir: &Path) -> Self {
+        Self { path: dir.join(FILE_NAME), boot_id: boot_id(), entries: RefCell::default() }
+    }
+
+    /// Where it lies.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A process was started.
+    pub(super) fn add(&self, component: String, instance: InstanceId, pid: u32, program: &Path) {
+        let entry = Entry {
+            component,
+            instance,
+            pid,
+            start_time: start_time(pid).unwrap_or(0),
+            boot_id: self.boot_id.clone(),
+            executable: program.into(),
+        };
+        self.entries.borrow_mut().insert(instance, entry);
+        self.write();
+    }
+
+    /// A process was reaped.
+    pub(super) fn remove(&self, instance: InstanceId) {
+        self.entries.borrow_mut().remove(&instance);
+        self.write();
+    }
+
+    fn write(&self) {
+        let entries: Vec<Entry> = self.entries.borrow().values().cloned().collect();
+        if let Err(error) = write(&self.path, &entries) {
+            let path = self.path.display();
+            tracing::error!(event = "journal-unwritten", %path, %error, next = "go on without");
+        }
+    }
+}
+
+/// What the predecessor left in `dir`; nothing when it left no list, or no readable one.
+pub(super) fn read(dir: &Path) -> Vec<Entry> {
+    let path = dir.join(FILE_NAME);
+    let Ok(text) = fs::read_to_string(&path) else { return Vec::new() };
+    serde_json::from_str(&text).unwrap_or_else(|error| {
+        tracing::error!(event = "journal-unreadable", path = %path.display(), %error);
+        Vec::new()
+    })
+}
+
+fn write(path: &Path, entries: &[Entry]) -> io::Result<()> {
+    let temporary = path.with_extension("new");
+    fs::write(&temporary, serde_json::to_vec_pretty(entries)?)?;
+    fs::rename(temporary, path)
+}
+
+/// When `pid` started, ticks after boot; `None` when it is gone.
+pub(super) fn start_time(pid: u32) -> Option<u64> {
+    parse_start_time(&fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)
+}
+
+/// Differs from boot to boot.
+pub(super) fn boot_id() -> String {
+    let id = fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
+    id.trim().to_string()
+}

@@ -1,0 +1,402 @@
+//! One task a process: from its start to its end, which is told exactly once.
+
+use std::io;
+use std::process::ExitStatus;
+use std::rc::Rc;
+
+use rustix::fd::OwnedFd;
+use rustix::process::{Pid, PidfdFlags, Signal, kill_process_group, pidfd_open};
+use sdr_component::protocol::{
+    Configure, ErrorReport, FromComponent, Hello, LineBuffer, Order, PROTOCOL_VERSION, StateReport,
+    ToComponent,
+};
+use sdr_core::{
+    effect::{Command, LaunchOrder},
+    input::InstanceNews,
+    lifecycle::LifecycleState,
+    time::Instant,
+};
+use tokio::io::Interest;
+use tokio::io::unix::AsyncFd;
+use tokio::net::UnixStream;
+use tokio::sync::mpsc;
+
+use super::instance::{Life, Overdue};
+use super::launch::{self, Launched};
+use super::{Shared, logs, samples, socket};
+use crate::clock;
+use crate::trouble::Kind;
+
+/// Orders kept for a component that has not greeted yet.
+const PENDING_MAX: usize = 16;
+/// Lines of output that stand in the reason of an end.
+const LAST_LINES: usize = 5;
+
+/// What reaches a keeper.
+#[derive(Debug)]
+pub(super) enum Message {
+    /// An order of the brain.
+    Command(Command),
+    /// Its process greeted; who it is was checked.
+    Greeted(Box<Greeting>),
+}
+
+/// A checked connection.
+#[derive(Debug)]
+pub(super) struct Greeting {
+    pub(super) stream: UnixStream,
+    pub(super) buffer: LineBuffer,
+    pub(super) hello: Hello,
+}
+
+/// Watches one process.
+pub(super) struct Keeper {
+    shared: Rc<Shared>,
+    order: LaunchOrder,
+    launched: Launched,
+    pid: Pid,
+    exit: AsyncFd<OwnedFd>,
+    link: Option<Link>,
+    life: Life,
+    configured: bool,
+    pending: Vec<Order>,
+    /// When this task last ran, to know a stall of the agent from one of the component.
+    turned_at: Instant,
+}
+
+struct Link {
+    stream: UnixStream,
+    buffer: LineBuffer,
+}
+
+/// Why a keeper's turn came.
+enum Turn {
+    Told(Message),
+    Received(io::Result<usize>),
+    Exited,
+    TimePassed,
+}
+
+impl Keeper {
+    /// Starts the process and stays until it is gone.
+    pub(super) async fn keep(
+        shared: Rc<Shared>,
+        order: LaunchOrder,
+        mut messages: mpsc::Receiver<Message>,
+    ) {
+        let instance = order.instance;
+        let started = launch::start(&shared.config, &order)
+            .map_err(|error| error.to_string())
+            .and_then(|launched| {
+                Self::new(Rc::clone(&shared), order, launched)
+                    .map_err(|error| format!("process cannot be watched: {error}"))
+            });
+        match started {
+            Ok(mut keeper) => {
+                keeper.announce().await;
+                keeper.watch(&mut messages).await;
+                keeper.bury().await;
+            }
+            Err(reason) => {
+                shared.kept.borrow_mut().remove(&instance);
+                shared.tell(instance, InstanceNews::LaunchFailed { reason }).await;
+            }
+        }
+    }
+
+    fn new(shared: Rc<Shared>, order: LaunchOrder, mut launched: Launched) -> io::Result<Self> {
+        let pid = Pid::from_child(&launched.child);
+        let exit = pidfd_open(pid, PidfdFlags::empty())
+            .map_err(io::Error::from)
+            .and_then(|handle| AsyncFd::with_interest(handle, Interest::READABLE));
+        let exit = match exit {
+            Ok(exit) => exit,
+            Err(error) => {
+                launched.child.kill()?;
+                launched.child.wait()?;
+                return Err(error);
+            }
+        };
+        let now = clock::now();
+        let life = Life::new(shared.config.patience, order.spec.execution, now);
+        Ok(Self {
+            shared,
+            order,
+            launched,
+            pid,
+            exit,
+            link: None,
+            life,
+            configured: false,
+            pending: Vec::new(),
+            turned_at: now,
+        })
+    }
+
+    /// The process runs: everybody who watches processes gets to know it.
+    async fn announce(&self) {
+        let (instance, component) = (self.order.instance, &self.order.component);
+        let pid = self.launched.child.id();
+        if let Some(kept) = self.shared.kept.borrow_mut().get_mut(&instance) {
+            kept.pid = pid;
+        }
+        let program = &self.launched.executable;
+        self.shared.journal.add(component.to_string(), instance, pid, program);
+        self.shared.outlets.watch.add(instance, pid, component);
+        tracing::debug!(event = "started", %component, instance, pid);
+        self.shared.tell(instance, InstanceNews::Started { pid }).await;
+    }
+
+    /// Until the process ends.
+    async fn watch(&mut self, messages: &mut mpsc::Receiver<Message>) {
+        loop {
+            match self.turn(messages).await {
+                Turn::Told(Message::Command(command)) => self.command(command).await,
+                Turn::Told(Message::Greeted(greeting)) => self.greeted(*greeting).await,
+                Turn::Received(received) => self.received(received).await,
+                Turn::Exited => return,
+                Turn::TimePassed => {}
+            }
+            self.look_at_the_clock().await;
+        }
+    }
+
+    /// Waits for the next thing to do. Lines come before the exit, so that a component's last
+    /// words are heard before its end.
+    async fn turn(&mut self, messages: &mut mpsc::Receiver<Message>) -> Turn {
+        let deadline = self.life.deadline();
+        let Self { link, exit, .. } = self;
+        let line = async {
+            match link {
+                Some(link) => socket::receive(&link.stream, &mut link.buffer).await,
+                None => std::future::pending().await,
+            }
+        };
+        tokio::select! {
+            biased;
+            Some(message) = messages.recv() => Turn::Told(message),
+            received = line => Turn::Received(received),
+            // An error of the reactor would mean that exits are not seen at all any more.
+            ready = exit.readable() => {
+                ready.expect("the reactor lives as long as its tasks").retain_ready();
+                Turn::Exited
+            }
+            () = clock::sleep_until(deadline) => Turn::TimePassed,
+        }
+    }
+
+    async fn command(&mut self, command: Command) {
+        let now = clock::now();
+        match command {
+            Command::Activate(token) => self.tell(Order::Activate { token }).await,
+            Command::Deactivate => self.tell(Order::Deactivate).await,
+            Command::Reset => self.tell(Order::Reset).await,
+            Command::Finish => {
+                self.life.finish(now);
+                match self.link {
+                    Some(_) => self.tell(Order::Finish).await,
+                    // Nobody is there to be asked.
+                    None => self.terminate(now),
+                }
+            }
+            Command::Kill => self.kill(now),
+        }
+    }
+
+    /// Sends an order, now or as soon as the component has greeted and was configured.
+    async fn tell(&mut self, order: Order) {
+        if self.link.is_some() && self.configured {
+            self.send(ToComponent::Command(order)).await;
+            return;
+        }
+        if self.pending.len() == PENDING_MAX {
+            self.pending.remove(0);
+        }
+        self.pending.push(order);
+    }
+
+    async fn send(&mut self, message: ToComponent) {
+        let Some(link) = &mut self.link else { return };
+        if let Err(error) = socket::say(&mut link.stream, &message).await {
+            let component = &self.order.component;
+            tracing::warn!(event = "component-deaf", %component, %error, next = "await its greeting");
+            self.link = None;
+        }
+    }
+
+    /// The component is there: tell it what it must know, and what was waiting for it.
+    async fn greeted(&mut self, greeting: Greeting) {
+        let Greeting { stream, buffer, hello } = greeting;
+        self.link = Some(Link { stream, buffer });
+        self.shared.outlets.types.learn(&self.order, &hello.profile);
+        if hello.now.state == LifecycleState::Created {
+            if !self.configured {
+                self.configured = true;
+                self.life.configured(clock::now());
+                self.send(ToComponent::Configure(Box::new(self.configure()))).await;
+            }
+        } else {
+            self.configured = true;
+            self.state(hello.now).await;
+        }
+        for order in std::mem::take(&mut self.pending) {
+            self.tell(order).await;
+        }
+        if self.life.is_ending() {
+            self.send(ToComponent::Command(Order::Finish)).await;
+        }
+        // Lines may have come with the greeting.
+        self.read_lines().await;
+    }
+
+    fn configure(&self) -> Configure {
+        let spec = &self.order.spec;
+        let config = &self.shared.config;
+        let wanted = |name: &String| spec.devices.iter().any(|device| device.as_str() == name);
+        let devices = config.devices.iter().filter(|(name, _)| wanted(name));
+        Configure {
+            v: PROTOCOL_VERSION,
+            component: self.order.component.clone(),
+            parameters: spec.parameters.iter().cloned().collect(),
+            devices: devices.map(|(name, path)| (name.clone(), path.clone())).collect(),
+            inputs: self.order.inputs.clone(),
+            output_depth: self.order.output_depth,
+            memory: config.memory.clone(),
+            execution: spec.execution.into(),
+        }
+    }
+
+    async fn received(&mut self, received: io::Result<usize>) {
+        match received {
+            Ok(0) => self.link = None,
+            Ok(_) => self.read_lines().await,
+            Err(error) => {
+                let component = &self.order.component;
+                tracing::debug!(event = "link-broken", %component, %error);
+                self.link = None;
+            }
+        }
+    }
+
+    async fn read_lines(&mut self) {
+        while let Some(link) = &mut self.link {
+            match link.buffer.next_message::<FromComponent>() {
+                Ok(Some(message)) => self.line(message).await,
+                Ok(None) => return,
+                Err(error) => {
+                    let message = format!("{}: {error}", self.order.component);
+                    self.shared.outlets.trouble.count(Kind::ComponentLine, &message);
+                    self.send(ToComponent::Error(ErrorReport { message })).await;
+                    self.link = None;
+                }
+            }
+        }
+    }
+
+    async fn line(&mut self, message: FromComponent) {
+        let instance = self.order.instance;
+        match message {
+            FromComponent::Hello(hello) => self.state(hello.now).await,
+            FromComponent::State(report) => self.state(report).await,
+            FromComponent::Heard(heard) => {
+                let news = InstanceNews::Heard { connection: heard.connection, token: heard.token };
+                self.shared.tell(instance, news).await;
+            }
+            FromComponent::Beat(_) => self.life.beat(clock::now()),
+            FromComponent::Counters(counters) => {
+                samples::record(&counters, &self.order, &self.shared.outlets.record);
+            }
+            FromComponent::Error(report) => {
+                let component = &self.order.component;
+                tracing::warn!(event = "component-says", %component, "{}", report.message);
+            }
+        }
+    }
+
+    async fn state(&mut self, report: StateReport) {
+        let StateReport { state, token, fault } = report;
+        self.life.state(state, clock::now());
+        let outlets = &self.shared.outlets;
+        outlets.watch.state(self.order.instance, state, token.as_ref(), &outlets.record);
+        let fault = fault.map(|fault| (fault.cause, fault.reason));
+        self.shared.tell(self.order.instance, InstanceNews::State { state, token, fault }).await;
+    }
+
+    async fn look_at_the_clock(&mut self) {
+        let now = clock::now();
+        if now.since(self.turned_at) > self.shared.config.patience.beat / 2
+            && self.life.deadline().is_some_and(|due| now.since(due) > self.stall())
+        {
+            self.life.forgive(now);
+        }
+        self.turned_at = now;
+        match self.life.overdue(now) {
+            Some(Overdue::Hung(reason)) => {
+                self.shared.tell(self.order.instance, InstanceNews::Hung { reason }).await;
+            }
+            Some(Overdue::Terminate) => self.terminate(now),
+            Some(Overdue::Kill) => self.kill(now),
+            None => {}
+        }
+    }
+
+    /// A timer of ours that is later than this says more about us than about the component.
+    fn stall(&self) -> std::time::Duration {
+        self.shared.config.patience.beat / 4
+    }
+
+    fn terminate(&mut self, now: Instant) {
+        self.life.terminated(now);
+        self.signal(Signal::TERM);
+    }
+
+    fn kill(&mut self, now: Instant) {
+        self.life.killed(now);
+        self.signal(Signal::KILL);
+    }
+
+    /// The whole group: a component's children end with it.
+    fn signal(&self, signal: Signal) {
+        match kill_process_group(self.pid, signal) {
+            Ok(()) | Err(rustix::io::Errno::SRCH) => {}
+            Err(error) => {
+                tracing::error!(event = "not-signalled", pid = ?self.pid, ?signal, %error);
+            }
+        }
+    }
+
+    /// Reaps the process and says how it ended.
+    async fn bury(mut self) {
+        // Before it is reaped: until then its number, and that of its group, are its own.
+        self.signal(Signal::KILL);
+        let how = match self.launched.child.wait() {
+            Ok(status) => describe(status),
+            Err(error) => format!("ended, status unknown: {error}"),
+        };
+        let last = logs::lines_at_end(&self.launched.log, self.launched.log_begin, LAST_LINES);
+        let reason = match last {
+            Ok((lines, _)) if !lines.trim().is_empty() => {
+                format!("{how}; last output: {}", lines.trim().replace('\n', " | "))
+            }
+            Ok(_) | Err(_) => how,
+        };
+        let instance = self.order.instance;
+        tracing::debug!(event = "ended", component = %self.order.component, instance, reason);
+        self.shared.kept.borrow_mut().remove(&instance);
+        self.shared.journal.remove(instance);
+        self.shared.outlets.watch.remove(instance, &self.shared.outlets.record);
+        self.shared.tell(instance, InstanceNews::Exited { reason }).await;
+    }
+}
+
+fn describe(status: ExitStatus) -> String {
+    use std::os::unix::process::ExitStatusExt as _;
+    match (status.code(), status.signal()) {
+        (Some(code), _) => format!("exit status {code}"),
+        (None, Some(number)) => match Signal::from_named_raw(number) {
+            Some(signal) => format!("killed by signal {number} ({signal:?})"),
+            None => format!("killed by signal {number}"),
+        },
+        (None, None) => format!("{status}"),
+    }
+}

@@ -1,0 +1,209 @@
+//! Processes of components: started, watched, told, ended.
+//!
+//! ```text
+//!  Effect::Launch, Command ─▶ Supervisor ─▶ one Keeper task a process ─▶ InstanceNews
+//!                                 ▲ hello        ▲ pidfd, socket lines, timers
+//!                              socket ◀──────── component
+//! ```
+
+mod instance;
+mod journal;
+mod keeper;
+mod launch;
+mod leftovers;
+mod logs;
+mod samples;
+mod socket;
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::time::Duration;
+use std::{fs, io};
+
+use sdr_component::protocol::SharedMemory;
+use sdr_core::{
+    effect::{Command, LaunchOrder},
+    id::ComponentKey,
+    input::{Input, InstanceId, InstanceNews},
+};
+use sdr_files::robot::OnAgentDeath;
+use tokio::sync::mpsc;
+
+use crate::metrics::Watch;
+use crate::record::RecordSender;
+use crate::taps::PortTypes;
+use crate::trouble::Trouble;
+use journal::Journal;
+use keeper::{Keeper, Message};
+pub(crate) use launch::{executables, find};
+pub(crate) use leftovers::end_leftovers;
+pub(crate) use logs::{LogFiles, lines_at_end};
+
+/// Messages that may wait for one keeper.
+const MAILBOX_MAX: usize = 64;
+/// How long all components have to end when the agent stops; their keepers kill long before.
+const STOP_MAX: Duration = Duration::from_secs(5);
+
+/// How processes are started and how patient their keepers are.
+#[derive(Clone, Debug)]
+pub(crate) struct SupervisorConfig {
+    /// Folders with executables, in this order.
+    pub(crate) path: Vec<PathBuf>,
+    /// Where components greet the agent.
+    pub(crate) socket: PathBuf,
+    /// Folder of the journal.
+    pub(crate) state: PathBuf,
+    /// Output of components.
+    pub(crate) logs: LogFiles,
+    /// Whether they go on without the agent.
+    pub(crate) on_agent_death: OnAgentDeath,
+    /// Files of the robot's devices.
+    pub(crate) devices: BTreeMap<String, String>,
+    /// Where samples lie.
+    pub(crate) memory: SharedMemory,
+    /// Bars of the watch.
+    pub(crate) patience: Patience,
+}
+
+/// How long a component may take.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patience {
+    /// From the start of the process to its greeting.
+    pub(crate) hello: Duration,
+    /// From `configure` to the state inactive; `on_initialize` may touch much memory.
+    pub(crate) initialize: Duration,
+    /// Between two beats while active, at least; five periods when that is longer.
+    pub(crate) beat: Duration,
+    /// From `finish` to SIGTERM.
+    pub(crate) finish: Duration,
+    /// From SIGTERM to SIGKILL.
+    pub(crate) terminate: Duration,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self {
+            hello: Duration::from_secs(10),
+            initialize: Duration::from_secs(60),
+            beat: Duration::from_secs(1),
+            finish: Duration::from_secs(1),
+            terminate: Duration::from_secs(2),
+        }
+    }
+}
+
+/// Ways for news of components.
+#[derive(Clone, Debug)]
+pub(crate) struct Outlets {
+    /// To the brain.
+    pub(crate) inputs: mpsc::Sender<Input>,
+    /// To the sampler.
+    pub(crate) watch: Watch,
+    /// To the recording.
+    pub(crate) record: RecordSender,
+    /// For garbage.
+    pub(crate) trouble: Trouble,
+    /// To those who record ports.
+    pub(crate) types: PortTypes,
+}
+
+/// Starts and commands processes. Lives on the loop's thread, within a `LocalSet`.
+#[derive(Debug)]
+pub(crate) struct Supervisor {
+    shared: Rc<Shared>,
+}
+
+/// What all keepers use.
+#[derive(Debug)]
+struct Shared {
+    config: SupervisorConfig,
+    outlets: Outlets,
+    journal: Journal,
+    kept: RefCell<BTreeMap<InstanceId, Kept>>,
+}
+
+/// How a keeper is reached.
+#[derive(Clone, Debug)]
+struct Kept {
+    component: ComponentKey,
+    /// 0 until the process runs.
+    pid: u32,
+    mailbox: mpsc::Sender<Message>,
+}
+
+impl Supervisor {
+    /// Opens the components' socket.
+    pub(crate) fn start(config: SupervisorConfig, outlets: Outlets) -> io::Result<Self> {
+        fs::create_dir_all(&config.logs.dir)?;
+        let socket = config.socket.clone();
+        let shared = Rc::new(Shared {
+            journal: Journal::new(&config.state),
+            config,
+            outlets,
+            kept: RefCell::default(),
+        });
+        socket::listen(&socket, Rc::clone(&shared))?;
+        tokio::task::spawn_local(logs::bound(Rc::downgrade(&shared)));
+        Ok(Self { shared })
+    }
+
+    /// Starts a process; what comes of it is instance news.
+    pub(crate) fn launch(&self, order: LaunchOrder) {
+        let (mailbox, messages) = mpsc::channel(MAILBOX_MAX);
+        let kept = Kept { component: order.component.clone(), pid: 0, mailbox };
+        self.shared.kept.borrow_mut().insert(order.instance, kept);
+        tokio::task::spawn_local(Keeper::keep(Rc::clone(&self.shared), order, messages));
+    }
+
+    /// Tells an instance something; nothing happens when it is gone, which was said already.
+    pub(crate) fn command(&self, instance: InstanceId, command: Command) {
+        let kept = self.shared.kept.borrow().get(&instance).cloned();
+        let Some(kept) = kept else { return };
+        if kept.mailbox.try_send(Message::Command(command)).is_err() {
+            tracing::warn!(event = "command-lost", instance, component = %kept.component);
+        }
+    }
+
+    /// Ends all components and the socket, or leaves them running when they are to be kept.
+    pub(crate) async fn stop(&self) {
+        if self.shared.config.on_agent_death == OnAgentDeath::Keep {
+            return;
+        }
+        let all: Vec<Kept> = self.shared.kept.borrow().values().cloned().collect();
+        for kept in &all {
+            // A full mailbox belongs to a keeper that is being told to end already.
+            let _ = kept.mailbox.try_send(Message::Command(Command::Finish));
+        }
+        let ended = async {
+            for kept in &all {
+                kept.mailbox.closed().await;
+            }
+        };
+        if tokio::time::timeout(STOP_MAX, ended).await.is_err() {
+            tracing::error!(event = "components-left", "some processes could not be ended");
+        }
+        remove_if_there(&self.shared.config.socket);
+        remove_if_there(self.shared.journal.path());
+    }
+}
+
+impl Shared {
+    /// Tells the brain.
+    async fn tell(&self, instance: InstanceId, news: InstanceNews) {
+        // The loop is gone only when the agent ends.
+        let _ = self.outlets.inputs.send(Input::Instance { instance, news }).await;
+    }
+}
+
+fn remove_if_there(path: &std::path::Path) {
+    match fs::remove_file(path) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) => tracing::warn!(event = "not-removed", path = %path.display(), %error),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,50 @@
+//! Chosen ports of this robot into the recording.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use sdr_component::message::definition_of;
+use sdr_core::{effect::LaunchOrder, spec::ComponentProfile};
+
+use crate::clock;
+use crate::data::{TapSample, TapSink};
+use crate::record::RecordSender;
+
+/// The ROS 2 type of each port that was met so far, by `system.component.port`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PortTypes(Arc<Mutex<BTreeMap<String, String>>>);
+
+impl PortTypes {
+    /// Learns from what a component says of itself and from what it is wired to.
+    pub(crate) fn learn(&self, order: &LaunchOrder, profile: &ComponentProfile) {
+        let mut types = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = &order.component;
+        for port in &profile.outputs {
+            let name = format!("{}.{}.{}", key.system, key.name, port.name);
+            types.insert(name, port.message_type.clone());
+        }
+        for wiring in &order.inputs {
+            types.insert(wiring.path.replace('/', "."), wiring.message_type.clone());
+        }
+    }
+
+    fn of(&self, port: &str) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get(port).cloned()
+    }
+}
+
+/// Where the data plane puts samples of tapped ports.
+pub(crate) fn sink(types: PortTypes, record: RecordSender) -> TapSink {
+    Box::new(move |sample: TapSample<'_>| {
+        let Some(message_type) = types.of(sample.port) else {
+            tracing::debug!(event = "tap-untyped", port = sample.port);
+            return;
+        };
+        let mut cdr = Vec::with_capacity(sample.body.len() + 4);
+        cdr.extend_from_slice(&[0, 1, 0, 0]);
+        cdr.extend_from_slice(sample.body);
+        let topic = format!("/{}", sample.port.replace('.', "/"));
+        let definition = definition_of(&message_type).unwrap_or_default();
+        record.message(&topic, &message_type, definition, clock::now().as_nanos(), cdr);
+    })
+}

@@ -1,0 +1,105 @@
+//! Bad input is counted, and said at a bounded rate.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use sdr_core::time::Instant;
+
+use crate::clock;
+use crate::events::Events;
+
+/// Time between two events about the same kind of bad input.
+const SAY_PERIOD: Duration = Duration::from_secs(10);
+
+/// Kinds of bad input that the shell itself sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Kind {
+    /// A datagram larger than any agent sends.
+    DatagramOversized,
+    /// A datagram that came while the loop was too busy to take it.
+    DatagramUnread,
+    /// A line on the components' socket that is none of the protocol.
+    ComponentLine,
+    /// A greeting on the components' socket by somebody who was not started by this agent.
+    ComponentHello,
+    /// A request body or address that the API does not know.
+    ApiRequest,
+}
+
+impl Kind {
+    /// The name of its counter.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::DatagramOversized => "datagrams_oversized",
+            Self::DatagramUnread => "datagrams_unread",
+            Self::ComponentLine => "component_lines_bad",
+            Self::ComponentHello => "component_hellos_refused",
+            Self::ApiRequest => "api_requests_bad",
+        }
+    }
+}
+
+/// The counters; cheap to clone.
+#[derive(Clone, Debug)]
+pub(crate) struct Trouble {
+    events: Events,
+    counts: Arc<Mutex<BTreeMap<Kind, Count>>>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Count {
+    seen: u64,
+    said_at: Option<Instant>,
+}
+
+impl Trouble {
+    /// Counters that speak through `events`.
+    pub(crate) fn new(events: Events) -> Self {
+        Self { events, counts: Arc::default() }
+    }
+
+    /// Counts one; the first of a while is an event.
+    pub(crate) fn count(&self, kind: Kind, what: &str) {
+        let now = clock::now();
+        let seen = {
+            let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+            let count = counts.entry(kind).or_default();
+            count.seen += 1;
+            match count.said_at {
+                Some(at) if now.since(at) < SAY_PERIOD => return,
+                Some(_) | None => count.said_at = Some(now),
+            }
+            count.seen
+        };
+        #[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^53")]
+        let event = self.events.new_event("bad-input", what).number(kind.word(), seen as f64);
+        self.events.publish(event);
+    }
+
+    /// All counters that are not zero.
+    pub(crate) fn counters(&self) -> BTreeMap<String, u64> {
+        let counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+        counts.iter().map(|(kind, count)| (kind.word().to_string(), count.seen)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdr_core::id::RobotId;
+
+    #[test]
+    fn a_flood_of_bad_input_is_counted_and_said_once() {
+        let events = Events::new(RobotId::new("robot-1").unwrap());
+        let trouble = Trouble::new(events.clone());
+
+        for _ in 0..1000 {
+            trouble.count(Kind::ComponentLine, "not JSON");
+        }
+        trouble.count(Kind::ApiRequest, "no such path");
+
+        assert_eq!(trouble.counters()["component_lines_bad"], 1000);
+        assert_eq!(events.since(0).len(), 2);
+    }
+}

@@ -1,0 +1,276 @@
+//! Everything round the brain: made in order at the start, ended in order at the stop.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{FlockOperation, flock};
+use sdr_component::protocol::SharedMemory;
+use sdr_core::{
+    brain::{Brain, Seams},
+    effect::StoredState,
+    id::RobotId,
+    input::Input,
+};
+use sdr_files::RobotConfig;
+use sdr_files::robot::OnAgentDeath;
+use thiserror::Error;
+use tokio::sync::mpsc;
+
+use crate::api::{self, AnswerDesk, Api, ApiError, ApiState, LatestPlan, Profiles, StatusQuestion};
+use crate::data::{Data, DataConfig, DataError, TapSink};
+use crate::effects::Effects;
+use crate::events::Events;
+use crate::mesh::udp::Mesh;
+use crate::metrics::{Metrics, Watch};
+use crate::record::{self, RecordSender, Recorder, RecorderNews};
+use crate::store::{self, Remembered, Store};
+use crate::supervisor::{self, Outlets, Supervisor};
+use crate::taps::{self, PortTypes};
+use crate::trouble::Trouble;
+use crate::{clock, config, memory};
+
+/// Inputs that may wait for the loop.
+const INPUTS_MAX: usize = 4096;
+/// Status questions that may wait for the loop.
+const QUESTIONS_MAX: usize = 16;
+
+/// Why the agent does not start. Nothing was changed on the robot; the operator can mend it.
+#[derive(Debug, Error)]
+pub(crate) enum StartError {
+    /// Another agent holds the folder.
+    #[error("{}: another agent uses this state; one robot has one agent", .0.display())]
+    StateTaken(PathBuf),
+    /// The API does not listen.
+    #[error("api: {0}")]
+    Api(#[from] ApiError),
+    /// The mesh does not listen.
+    #[error("mesh: listen at {address}: {source}")]
+    Mesh {
+        /// From robot.toml.
+        address: std::net::SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The data plane does not start.
+    #[error("{0}")]
+    Data(#[from] DataError),
+    /// A driver could not be made.
+    #[error("{what}: {source}")]
+    Io {
+        /// What was tried.
+        what: String,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// The drivers and what the loop reads.
+#[derive(Debug)]
+pub(crate) struct World {
+    /// Metrics, mesh, and what came of effects.
+    pub(crate) inputs: mpsc::Receiver<Input>,
+    /// From the API.
+    pub(crate) questions: mpsc::Receiver<StatusQuestion>,
+    /// Who takes orders.
+    pub(crate) effects: Effects,
+    api: Api,
+    metrics: Metrics,
+    recorder: Option<Recorder>,
+    memory: SharedMemory,
+    on_agent_death: OnAgentDeath,
+    /// Robots that the data plane knows.
+    robots: Vec<RobotId>,
+    /// Held as long as this agent lives.
+    _lock: File,
+}
+
+/// What is there before the first driver.
+struct Ground {
+    lock: File,
+    events: Events,
+    recorder: Option<Recorder>,
+    record: RecordSender,
+    stored: Option<StoredState>,
+}
+
+impl World {
+    /// Makes everything. Call within a `LocalSet`.
+    pub(crate) async fn start(robot: &RobotConfig) -> Result<(Box<Brain>, Self), StartError> {
+        let state = &robot.storage.state;
+        fs::create_dir_all(state).map_err(at("make", state))?;
+        let lock = lock(state)?;
+        // Before anything is cleaned: whoever answers there is a living agent.
+        let listener = api::open(&robot.api.socket).await?;
+        let ground = prepare(robot, lock)?;
+        let (sender, inputs) = mpsc::channel(INPUTS_MAX);
+        let (asker, questions) = mpsc::channel(QUESTIONS_MAX);
+        let trouble = Trouble::new(ground.events.clone());
+        let (watch, types) = (Watch::default(), PortTypes::default());
+
+        let address = robot.mesh.listen;
+        let mesh = Mesh::start(address, sender.clone(), trouble.clone())
+            .await
+            .map_err(|source| StartError::Mesh { address, source })?;
+        let mut brain_config = config::brain(robot);
+        brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
+        let seams = Seams { recovery: Box::new(|_| Err("wait".into())) };
+        let brain = Brain::new(brain_config, seams, ground.stored, clock::now());
+
+        let outlets = Outlets {
+            inputs: sender.clone(),
+            watch: watch.clone(),
+            record: ground.record.clone(),
+            trouble: trouble.clone(),
+            types: types.clone(),
+        };
+        let supervisor_config = config::supervisor(robot);
+        let logs = supervisor_config.logs.clone();
+        let supervisor =
+            Supervisor::start(supervisor_config, outlets).map_err(because("components' socket"))?;
+        let store = Store::start(state.clone(), sender.clone(), ground.events.clone())
+            .map_err(because("store"))?;
+        let metrics =
+            Metrics::start(config::metrics(robot), watch, sender.clone(), ground.record.clone())
+                .map_err(because("metrics"))?;
+        let data =
+            start_data(robot, sender.clone(), taps::sink(types.clone(), ground.record.clone()))?;
+
+        let (desk, plan) = (AnswerDesk::default(), LatestPlan::default());
+        let api_state = ApiState {
+            robot: robot.name.clone(),
+            inputs: sender.clone(),
+            questions: asker,
+            desk: desk.clone(),
+            events: ground.events.clone(),
+            trouble,
+            plan: plan.clone(),
+            logs,
+            recording: ground.recorder.as_ref().map(Recorder::flusher),
+            profiles: Profiles::new(config::component_path(robot)),
+        };
+        let api = Api::start(robot.api.socket.clone(), listener, api_state);
+        let events = ground.events;
+        let effects = Effects { mesh, store, supervisor, data, desk, events, plan, inputs: sender };
+        let world = Self {
+            inputs,
+            questions,
+            effects,
+            api,
+            metrics,
+            recorder: ground.recorder,
+            memory: config::shared_memory(robot),
+            on_agent_death: robot.components.on_agent_death,
+            robots: Vec::new(),
+            _lock: ground.lock,
+        };
+        Ok((brain, world))
+    }
+
+    /// Tells the data plane which robots there are, when that changed.
+    pub(crate) fn name_robots(&mut self, brain: &Brain) {
+        let status = brain.status(clock::now());
+        let robots: Vec<RobotId> =
+            status.robots.iter().filter_map(|robot| RobotId::new(&robot.name).ok()).collect();
+        if robots != self.robots {
+            self.effects.data.set_robots(robots.clone());
+            self.robots = robots;
+        }
+    }
+
+    /// Ends everything, the last first; components go on when they are to be kept.
+    pub(crate) async fn stop(mut self) {
+        self.api.stop();
+        // Nobody reads them any more; whoever sends is told so instead of waiting.
+        self.inputs.close();
+        self.effects.supervisor.stop().await;
+        drop(self.metrics);
+        let Effects { data, store, events, .. } = self.effects;
+        data.stop();
+        drop(store);
+        events.publish(events.new_event("agent-stopped", "told to stop"));
+        drop(self.recorder);
+        match self.on_agent_death {
+            OnAgentDeath::Keep => {}
+            OnAgentDeath::Stop => memory::clean(&self.memory),
+        }
+    }
+}
+
+/// Reads what was remembered and clears what a predecessor left.
+fn prepare(robot: &RobotConfig, lock: File) -> Result<Ground, StartError> {
+    let state = &robot.storage.state;
+    let events = Events::new(robot.name.clone());
+    supervisor::end_leftovers(state, &events);
+    memory::clean(&config::shared_memory(robot));
+    let recorder = start_recorder(robot, &events)?;
+    let record = match &recorder {
+        Some(recorder) => recorder.sender(),
+        None => RecordSender::nowhere(&robot.name),
+    };
+    events.record_into(record.clone());
+    let stored = match store::read(state).map_err(at("read the state in", state))? {
+        Remembered::Nothing => None,
+        Remembered::State(stored) => Some(stored),
+        Remembered::Corrupt { set_aside, reason } => {
+            let file = set_aside.display();
+            let said = format!("{reason}; kept as {file}, starting from what the mesh knows");
+            tracing::error!(event = "state-corrupt", %file, %reason);
+            events.publish(events.new_event("state-corrupt", said));
+            None
+        }
+    };
+    let started = format!("sdr-agent {} on {}", env!("CARGO_PKG_VERSION"), robot.name);
+    let pid = f64::from(std::process::id());
+    events.publish(events.new_event("agent-started", started).number("pid", pid));
+    Ok(Ground { lock, events, recorder, record, stored })
+}
+
+fn start_recorder(robot: &RobotConfig, events: &Events) -> Result<Option<Recorder>, StartError> {
+    let Some(wanted) = &robot.storage.recordings else { return Ok(None) };
+    // Half for this recording, half for those before it.
+    let half = wanted.max.0 / 2;
+    record::forget_oldest(&wanted.dir, &robot.name, half);
+    let events = events.clone();
+    let news = move |news: RecorderNews| events.publish(news.event(&events));
+    let recorder = Recorder::start(&wanted.dir, &robot.name, half, news)
+        .map_err(at("record into", &wanted.dir))?;
+    Ok(Some(recorder))
+}
+
+fn start_data(
+    robot: &RobotConfig,
+    inputs: mpsc::Sender<Input>,
+    sink: TapSink,
+) -> Result<Data, StartError> {
+    let data_config = DataConfig {
+        robot: robot.name.clone(),
+        domain_id: robot.ros.domain_id,
+        memory: config::shared_memory(robot),
+    };
+    let data = Data::start(data_config, inputs, sink)?;
+    let ports = robot.storage.recordings.iter().flat_map(|wanted| &wanted.ports);
+    data.tap(ports.map(ToString::to_string).collect());
+    Ok(data)
+}
+
+/// Only one agent may use a state: its numbers must never be given twice.
+fn lock(state: &Path) -> Result<File, StartError> {
+    let path = state.join("lock");
+    let file = File::options().create(true).truncate(false).write(true).open(&path);
+    let file = file.map_err(at("open", &path))?;
+    match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) => Ok(file),
+        Err(rustix::io::Errno::WOULDBLOCK) => Err(StartError::StateTaken(state.into())),
+        Err(error) => Err(at("lock", &path)(error.into())),
+    }
+}
+
+fn at(verb: &str, path: &Path) -> impl FnOnce(io::Error) -> StartError {
+    because(format!("{verb} {}", path.display()))
+}
+
+fn because(what: impl Into<String>) -> impl FnOnce(io::Error) -> StartError {
+    let what = what.into();
+    move |source| StartError::Io { what, source }
+}
