@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::marker::PhantomData;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use sdr_core::{id::Name, order::Token};
+use sdr_core::order::Token;
 
 use super::{Connection, PortError};
 use crate::{
@@ -105,7 +105,6 @@ impl SharedInput {
 /// An input without its type.
 #[derive(Debug)]
 pub(crate) struct InputCore {
-    pub(crate) name: Name,
     pub(crate) connections: Vec<Connection>,
     /// Accepted and not taken yet, with the index of the connection in the system.
     queue: VecDeque<(u16, Sample)>,
@@ -116,9 +115,8 @@ pub(crate) struct InputCore {
 }
 
 impl InputCore {
-    pub(crate) fn new<M: Message>(name: Name, connections: Vec<Connection>) -> Self {
+    pub(crate) fn new<M: Message>(connections: Vec<Connection>) -> Self {
         Self {
-            name,
             connections,
             queue: VecDeque::new(),
             heard: Vec::new(),

@@ -19,16 +19,15 @@ fn token(number: u64, run: u32) -> Token {
 }
 
 fn input<M: Message>(memory: &Memory, depth: u8) -> (SharedInput, InPort<M>) {
-    let port = Name::new("value").unwrap();
     let wiring = InputWiring {
-        port: port.clone(),
+        port: Name::new("value").unwrap(),
         connection: 4,
         path: String::from("s/c/value"),
         message_type: M::TYPE.to_owned(),
         qos: Qos { reliability: Reliability::Reliable, depth, deadline: None },
     };
     let subscriber = memory.subscriber(&wiring.path, depth).unwrap();
-    let core = InputCore::new::<M>(port, vec![Connection::new(wiring, subscriber)]);
+    let core = InputCore::new::<M>(vec![Connection::new(wiring, subscriber)]);
     let shared = SharedInput::new(core);
     shared.lock().listen();
     (shared.clone(), InPort::new(shared))

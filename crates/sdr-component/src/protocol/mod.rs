@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 
 use sdr_core::{
     effect::InputWiring,
-    id::{ComponentKey, Name},
+    id::{ComponentKey, Name, RobotId},
     input::InstanceId,
     lifecycle::LifecycleState,
     order::Token,
@@ -75,7 +75,8 @@ pub enum FromComponent {
     Beat(Beat),
     /// Figures of all ports, each [`COUNTERS_PERIOD`].
     Counters(Counters),
-    /// The agent's line could not be understood or carried out.
+    /// The agent's line could not be understood (the connection is closed then), or was
+    /// refused and changed nothing.
     Error(ErrorReport),
 }
 
@@ -118,7 +119,7 @@ pub struct StateReport {
     /// The token under which it is active; `null` when it is not.
     #[serde(default)]
     pub token: Option<Token>,
-    /// Why it is in the error state, or why the last command was refused.
+    /// Why it is in the error state.
     #[serde(default)]
     pub fault: Option<Fault>,
 }
@@ -139,7 +140,7 @@ pub struct Heard {
 pub struct Beat {
     /// Ticks so far.
     pub ticks: u64,
-    /// Ticks that began later than their period by half of it, or were skipped.
+    /// Ticks that began late by more than half a period, or were skipped.
     pub late: u64,
     /// Longest time between two ticks since the last beat, nanoseconds.
     pub period_worst_ns: u64,
@@ -288,6 +289,20 @@ pub struct Reconfigure {
 pub struct ErrorReport {
     /// Where, what was found, what is allowed.
     pub message: String,
+}
+
+/// Reads a key as it stands in [`ENV_COMPONENT`]: `system/name` or `system/name@robot`.
+pub fn parse_component_key(text: &str) -> Result<ComponentKey, String> {
+    let (path, robot) = match text.split_once('@') {
+        Some((path, robot)) => (path, Some(robot)),
+        None => (text, None),
+    };
+    let (system, name) =
+        path.split_once('/').ok_or("no component; allowed: system/name or system/name@robot")?;
+    let scope = robot.map(RobotId::new).transpose().map_err(|error| error.to_string())?;
+    let system = Name::new(system).map_err(|error| error.to_string())?;
+    let name = Name::new(name).map_err(|error| error.to_string())?;
+    Ok(ComponentKey { system, name, scope })
 }
 
 #[cfg(test)]

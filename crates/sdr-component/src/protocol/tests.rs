@@ -3,7 +3,6 @@
 use proptest::prelude::*;
 
 use sdr_core::{
-    id::RobotId,
     order::Epoch,
     recover::Cause,
     spec::{Qos, Reliability},
@@ -101,6 +100,17 @@ fn every_word_of_a_component_survives_the_wire() {
     ];
     for message in messages {
         assert_eq!(through(&message), message);
+    }
+}
+
+#[test]
+fn a_key_is_read_as_it_is_written() {
+    let pinned = ComponentKey { scope: Some(RobotId::new("robot-2").unwrap()), ..key() };
+    for key in [key(), pinned] {
+        assert_eq!(parse_component_key(&key.to_string()), Ok(key));
+    }
+    for bad in ["", "anomaly", "a/b/c", "a/B", "a/b@"] {
+        assert!(parse_component_key(bad).is_err(), "{bad}");
     }
 }
 
