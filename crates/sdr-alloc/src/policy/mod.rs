@@ -231,7 +231,7 @@ impl Default for Policy {
             },
             relaxed: Some(Bars {
                 cpu_used_at_most: Some(Permille(950)),
-                memory_free_at_least: Some(Bytes::mega(100)),
+                memory_free_at_least: Some(Bytes::mega(150)),
                 battery_at_least: Some(BatteryBar::new(Permille(150))),
                 ..Bars::none()
             }),
