@@ -9,5 +9,6 @@ pub(crate) mod undeploy;
 // pub(crate) mod validate;
 
 mod await_system;
+mod awaited;
 mod describe;
 mod duration;

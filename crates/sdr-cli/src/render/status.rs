@@ -58,6 +58,17 @@ pub(crate) fn problems(view: &StatusView) -> Vec<Problem> {
         problems.extend(parts.filter_map(|component| trouble(component, view)));
         problems.extend(silent_connections(system));
     }
+    let raised = view.conditions.iter().filter(|condition| condition.raised);
+    problems.extend(raised.map(|condition| {
+        Problem::new(format!(
+            "{} of {} on {}, raised after {}: {}",
+            condition.cause,
+            condition.component,
+            view.seen_from,
+            span(condition.hold_ms),
+            condition.reason
+        ))
+    }));
     let quiet = view.robots.iter().filter(|robot| !robot.alive);
     problems.extend(quiet.map(|robot| {
         Problem::new(format!(
@@ -204,27 +215,22 @@ fn component_note(component: &ComponentView) -> String {
     parts.join("; ")
 }
 
-/// Causes that hold on the answering robot, each with how long it must hold.
+/// Causes that hold on the answering robot, but not for long enough to be acted on.
 fn conditions(view: &StatusView, columns: usize) -> Vec<String> {
-    let mut lines = Vec::new();
-    for condition in &view.conditions {
-        let stand = match condition.raised {
-            true => format!("raised after {}", span(condition.hold_ms)),
-            false => format!("held {} of {}", span(condition.held_ms), span(condition.hold_ms)),
-        };
+    let mut lines = vec![String::new()];
+    for condition in view.conditions.iter().filter(|condition| !condition.raised) {
         let line = format!(
-            "{} on {} for {}: {stand} ({})",
+            "{} of {} on {}, held {} of {}: {}",
             condition.cause,
-            view.seen_from,
             condition.component,
+            view.seen_from,
+            span(condition.held_ms),
+            span(condition.hold_ms),
             one_line(&condition.reason)
         );
         lines.extend(wrap(&line, columns, "  "));
     }
-    if !lines.is_empty() {
-        lines.insert(0, String::new());
-    }
-    lines
+    if lines.len() == 1 { Vec::new() } else { lines }
 }
 
 fn next_step(view: &StatusView) -> Vec<String> {

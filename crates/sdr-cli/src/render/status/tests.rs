@@ -1,5 +1,7 @@
 //! Golden screens.
 
+use sdr_core::api::ConditionView;
+
 use super::*;
 use crate::render::fixture;
 
@@ -82,4 +84,25 @@ fn a_component_on_a_quiet_robot_is_wrong_though_its_last_word_was_active() {
     view.robots[2].alive = false;
     let texts: Vec<String> = problems(&view).into_iter().map(|problem| problem.text).collect();
     assert!(texts.contains(&"fisheye was on robot-3, which is quiet".to_owned()), "{texts:?}");
+}
+
+#[test]
+fn a_condition_is_wrong_once_it_is_raised_and_shown_before() {
+    let mut view = fixture::fleet();
+    view.conditions.push(ConditionView {
+        system: "exploration".into(),
+        component: "camera".into(),
+        cause: "memory-short".into(),
+        held_ms: 1200,
+        hold_ms: 2000,
+        raised: false,
+        reason: "free 80 MB, bar 100 MB".into(),
+    });
+    let line = "memory-short of camera on robot-2, held 1.2 s of 2.0 s: free 80 MB, bar 100 MB";
+    assert_eq!(problems(&view), []);
+    assert!(text(&view).contains(line));
+
+    view.conditions[0].raised = true;
+    let raised = "! memory-short of camera on robot-2, raised after 2.0 s: free 80 MB, bar 100 MB";
+    assert!(text(&view).starts_with(raised), "{}", text(&view));
 }
