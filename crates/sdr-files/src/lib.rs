@@ -13,12 +13,16 @@
 #![forbid(unsafe_code)]
 
 mod near;
+mod policy;
 pub mod problem;
 mod read;
 mod tree;
 pub mod units;
 
 pub mod robot;
+mod system;
 
+pub use policy::{load_allocation, load_recovery};
 pub use problem::{Problem, Problems};
 pub use robot::{RobotConfig, load_robot};
+pub use system::{LoadedSystem, link_profiles, load_system, parse_system};

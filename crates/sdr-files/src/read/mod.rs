@@ -5,14 +5,14 @@ mod values;
 
 use std::net::SocketAddr;
 
-use schemars::{JsonSchema, Schema, SchemaGenerator};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-pub(crate) use table::{Keys, table};
-pub(crate) use values::{At, Map, OneOrMany};
+pub(crate) use table::{Keys, choices, table};
+pub(crate) use values::{At, Map, quantity};
 
 use crate::{
     near::allowed_words,
-    problem::{Mark, Problem, Source},
+    problem::{Mark, Problem, Problems, Source},
     tree::{Body, Node},
 };
 
@@ -73,16 +73,22 @@ impl Reader {
         self.problem(mark, message, Some(String::from("take it out")));
     }
 
-    pub(crate) fn source(&self) -> &Source {
-        &self.source
+    /// Takes over the problems of another file.
+    pub(crate) fn adopt(&mut self, problems: Problems) {
+        self.problems.extend(problems);
+    }
+
+    /// `value` when no problem was told.
+    pub(crate) fn finish<T>(self, value: Option<T>) -> Result<T, Problems> {
+        match (value, Problems::new(self.problems)) {
+            (Some(value), None) => Ok(value),
+            (_, Some(problems)) => Err(problems),
+            (None, None) => Err(Problems::of(Vec::new())),
+        }
     }
 
     pub(crate) fn is_clean(&self) -> bool {
         self.problems.is_empty()
-    }
-
-    pub(crate) fn into_problems(self) -> Vec<Problem> {
-        self.problems
     }
 
     /// The text of `node`.
@@ -132,4 +138,14 @@ pub(crate) fn address(text: &str, port_default: u16) -> Option<SocketAddr> {
 /// The schema of a type read by this module, for derived schemas around it.
 pub(crate) fn nested<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
     generator.subschema_for::<T>()
+}
+
+/// The schema of a table with the one key `word`.
+pub(crate) fn one_key<T: Read>(word: &str, generator: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "type": "object",
+        "properties": { word: T::schema(generator) },
+        "required": [word],
+        "additionalProperties": false,
+    })
 }

@@ -97,4 +97,20 @@ macro_rules! table {
     };
 }
 
-pub(crate) use table;
+/// Words for the variants of an enum.
+macro_rules! choices {
+    ($($type:ty { $($word:literal => $value:expr,)* })*) => {$(
+        impl $crate::read::Read for $type {
+            fn read(node: &$crate::tree::Node, reader: &mut $crate::read::Reader) -> Option<Self> {
+                let index = reader.choice(node, &[$($word),*], &[])?;
+                [$($value),*].into_iter().nth(index)
+            }
+
+            fn schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                schemars::json_schema!({ "enum": [$($word),*] })
+            }
+        }
+    )*};
+}
+
+pub(crate) use {choices, table};

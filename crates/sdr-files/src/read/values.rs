@@ -22,6 +22,13 @@ pub(crate) struct At<T> {
     pub(crate) mark: Mark,
 }
 
+impl<T> At<T> {
+    /// Another value at the same place.
+    pub(crate) fn map<U>(self, change: impl FnOnce(T) -> U) -> At<U> {
+        At { value: change(self.value), mark: self.mark }
+    }
+}
+
 impl<T: Read> Read for At<T> {
     fn read(node: &Node, reader: &mut Reader) -> Option<Self> {
         T::read(node, reader).map(|value| Self { value, mark: node.mark })
@@ -86,23 +93,6 @@ impl<T: Read> Read for Vec<T> {
     }
 }
 
-/// One value or a list of them.
-#[derive(Clone, Debug)]
-pub(crate) struct OneOrMany<T>(pub(crate) Vec<T>);
-
-impl<T: Read> Read for OneOrMany<T> {
-    fn read(node: &Node, reader: &mut Reader) -> Option<Self> {
-        if matches!(node.body, Body::List(_)) {
-            return Vec::read(node, reader).map(Self);
-        }
-        T::read(node, reader).map(|value| Self(vec![value]))
-    }
-
-    fn schema(generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "anyOf": [T::schema(generator), Vec::<T>::schema(generator)] })
-    }
-}
-
 /// A table whose keys are free; a value that cannot be read is told and `None`.
 #[derive(Clone, Debug)]
 pub(crate) struct Map<T>(pub(crate) Vec<(At<String>, Option<T>)>);
@@ -122,6 +112,20 @@ impl<T: Read> Read for Map<T> {
 
     fn schema(generator: &mut SchemaGenerator) -> Schema {
         json_schema!({ "type": "object", "additionalProperties": T::schema(generator) })
+    }
+}
+
+impl<T: Read> JsonSchema for Map<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        Cow::Borrowed("Map")
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        Self::schema(generator)
     }
 }
 

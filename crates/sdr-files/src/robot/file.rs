@@ -14,7 +14,7 @@ use super::{
     sources::{BatteryEntry, PositionEntry, RssiEntry},
 };
 use crate::{
-    read::{At, Map, Read, Reader, table},
+    read::{At, Map, Read, Reader, choices, table},
     tree::{Body, Node},
 };
 
@@ -290,21 +290,6 @@ impl Read for RadioMode {
     }
 }
 
-/// Words for the variants of an enum.
-macro_rules! choices {
-    ($($type:ty { $($word:literal => $value:expr,)* })*) => {$(
-        impl Read for $type {
-            fn read(node: &Node, reader: &mut Reader) -> Option<Self> {
-                let index = reader.choice(node, &[$($word),*], &[])?;
-                [$($value),*].into_iter().nth(index)
-            }
-
-            fn schema(_: &mut SchemaGenerator) -> Schema {
-                json_schema!({ "enum": [$($word),*] })
-            }
-        }
-    )*};
-}
 choices! {
     OnAgentDeath { "keep" => Self::Keep, "stop" => Self::Stop, }
     RolePreference {

@@ -50,11 +50,7 @@ fn robot_of(source: Source, places: &Places) -> Result<RobotConfig, Problems> {
             .and_then(|file| check::checked(file, places, &mut reader)),
         Err(problems) => return Err(Problems::of(problems)),
     };
-    match (config, Problems::new(reader.into_problems())) {
-        (Some(config), None) => Ok(config),
-        (_, Some(problems)) => Err(problems),
-        (None, None) => Err(Problems::of(Vec::new())),
-    }
+    reader.finish(config)
 }
 
 #[cfg(test)]

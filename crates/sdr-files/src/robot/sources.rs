@@ -6,7 +6,7 @@ use schemars::{Schema, SchemaGenerator, json_schema};
 
 use super::config::SystemPort;
 use crate::{
-    read::{At, Read, Reader},
+    read::{At, Read, Reader, one_key},
     tree::{Body, Key, Node},
 };
 
@@ -146,14 +146,4 @@ impl Read for PositionEntry {
 fn sensor_schema(words: &[&str], generator: &mut SchemaGenerator) -> Schema {
     let forms: Vec<Schema> = words.iter().map(|word| one_key::<String>(word, generator)).collect();
     json_schema!({ "anyOf": forms })
-}
-
-/// The schema of a table with the one key `word`.
-pub(crate) fn one_key<T: Read>(word: &str, generator: &mut SchemaGenerator) -> Schema {
-    json_schema!({
-        "type": "object",
-        "properties": { word: T::schema(generator) },
-        "required": [word],
-        "additionalProperties": false,
-    })
 }

@@ -16,6 +16,7 @@ pub(crate) fn parse_yaml(source: &Source) -> Result<Node, Vec<Problem>> {
     let options = serde_yaml::options! {
         duplicate_keys: DuplicateKeyPolicy::PassThrough,
         with_snippet: false,
+        strict_booleans: true,
     };
     let start = Mark { line: 1, column: 1, width: 1 };
     let raw = match serde_yaml::from_str_with_options::<Spanned<Raw>>(source.text(), options) {

@@ -39,6 +39,19 @@ pub(crate) struct Key {
 }
 
 impl Node {
+    /// The first key `word` in this value or below it.
+    pub(crate) fn find_key(&self, word: &str) -> Option<(&Key, &Self)> {
+        match &self.body {
+            Body::Table(entries) => entries
+                .iter()
+                .find(|(key, _)| key.word == word)
+                .map(|(key, node)| (key, node))
+                .or_else(|| entries.iter().find_map(|(_, node)| node.find_key(word))),
+            Body::List(items) => items.iter().find_map(|item| item.find_key(word)),
+            Body::Nothing | Body::Bool(_) | Body::Int(_) | Body::Float(_) | Body::Text(_) => None,
+        }
+    }
+
     /// What was found, in words.
     pub(crate) fn found(&self) -> String {
         match &self.body {

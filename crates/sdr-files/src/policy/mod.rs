@@ -1,0 +1,37 @@
+//! The two policies of a system: where they are found, and what they say.
+//!
+//! A name is looked up as `policies/<kind>/<name>.yaml` in the folder of the file that names
+//! it, in the folder above, beside the file itself (for `extends`), and among the built-in
+//! ones; words with a `/` or ending in `.yaml` are paths from that folder.
+
+mod allocation;
+mod allocation_file;
+mod bars;
+mod conditions;
+mod find;
+mod recovery;
+mod recovery_file;
+
+use std::path::Path;
+
+use sdr_alloc::Policy as AllocationPolicy;
+use sdr_recovery::Policy as RecoveryPolicy;
+
+pub(crate) use allocation_file::AllocationFile;
+pub(crate) use find::{Finder, PolicyEntry, PolicyFile};
+pub(crate) use recovery_file::RecoveryFile;
+
+use crate::problem::{Problems, Source};
+
+/// Reads and checks the allocation policy at `path`, with those it extends.
+pub fn load_allocation(path: &Path) -> Result<AllocationPolicy, Problems> {
+    find::load::<AllocationFile>(Source::load(path)?, &Finder::beside(path))
+}
+
+/// Reads and checks the recovery policy at `path`, with those it extends.
+pub fn load_recovery(path: &Path) -> Result<RecoveryPolicy, Problems> {
+    find::load::<RecoveryFile>(Source::load(path)?, &Finder::beside(path))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,192 @@
+//! From a recovery policy as written to the checked one.
+
+use sdr_core::recover::Cause;
+use sdr_recovery::{Ladder, Limits, Policy, PolicyParts, Rule, Rung};
+
+use super::{
+    conditions::trigger,
+    find::{Finding, PolicyFile},
+    recovery_file::{LimitsTable, RecoveryFile, RuleChanges, RuleTable, RulesEntry, cause_of},
+};
+use crate::read::{At, Map, Reader};
+
+impl PolicyFile for RecoveryFile {
+    type Policy = Policy;
+    const KIND: &'static str = "recovery";
+    const BUILT_IN: &'static [(&'static str, &'static str)] = &[
+        ("default", include_str!("../../../../policies/recovery/default.yaml")),
+        ("exploration", include_str!("../../../../policies/recovery/exploration.yaml")),
+    ];
+
+    fn standard() -> Policy {
+        Policy::default()
+    }
+
+    fn checked(self, at: Finding<'_>, reader: &mut Reader) -> Option<Policy> {
+        let name = at.name(self.recovery, "recovery", reader);
+        let extended = self.extends.is_some();
+        let mut parts = match self.extends {
+            Some(extends) => at.finder.named::<Self>(&extends, reader)?.parts().clone(),
+            None => PolicyParts {
+                name: String::new(),
+                ladders: Vec::new(),
+                rules: Vec::new(),
+                limits: Limits::default(),
+            },
+        };
+        if let Some(changes) = &self.r#override
+            && !extended
+        {
+            let help = String::from("allowed: `extends: default`, or the rules under `rules`");
+            reader.problem(changes.mark, "`override` without `extends`", Some(help));
+        }
+        ladders(self.ladders, &mut parts, reader);
+        let changes = self.r#override.map(|changes| changes.value.0).unwrap_or_default();
+        let changed = change_rules(changes, &mut parts, reader);
+        match self.rules {
+            None => {}
+            Some(At { value: RulesEntry::Only, mark }) => {
+                if changed.is_empty() {
+                    let message = "`rules: only` keeps the rules under `override`, and none is there";
+                    reader.problem(mark, message, None);
+                }
+                parts.rules.retain(|rule| changed.contains(&rule.cause));
+            }
+            Some(At { value: RulesEntry::List(rules), .. }) => {
+                add_rules(rules, &mut parts, reader);
+            }
+        }
+        if let Some(limits) = self.limits {
+            apply_limits(limits, &mut parts.limits);
+        }
+        parts.name = name?;
+        if !reader.is_clean() {
+            return None;
+        }
+        Policy::new(parts)
+            .map_err(|error| reader.problem(at.tree.mark, error.to_string(), None))
+            .ok()
+    }
+}
+
+fn ladders(
+    given: Option<Map<At<Vec<Rung>>>>,
+    parts: &mut PolicyParts,
+    reader: &mut Reader,
+) {
+    for (name, rungs) in given.map(|ladders| ladders.0).unwrap_or_default() {
+        let Some(rungs) = rungs else { continue };
+        match Ladder::new(rungs.value) {
+            Ok(ladder) => {
+                parts.ladders.retain(|(other, _)| *other != name.value);
+                parts.ladders.push((name.value, ladder));
+            }
+            Err(error) => {
+                let message = format!("ladder `{}`: {error}", name.value);
+                let help = String::from(
+                    "allowed: local-standby, restart, standby-elsewhere, launch-elsewhere in this order, hold last",
+                );
+                reader.problem(name.mark, message, Some(help));
+            }
+        }
+    }
+}
+
+/// Changes rules by cause and tells which causes were named.
+fn change_rules(
+    changes: Vec<(At<String>, Option<At<RuleChanges>>)>,
+    parts: &mut PolicyParts,
+    reader: &mut Reader,
+) -> Vec<Cause> {
+    let mut changed = Vec::new();
+    for (word, change) in changes {
+        let Some(cause) = cause_of(&word, reader) else { continue };
+        let index = parts.rules.iter().position(|rule| rule.cause == cause);
+        let Some(index) = index else {
+            let known: Vec<&str> = parts.rules.iter().map(|rule| rule.cause.word()).collect();
+            let message = format!("the policy under `extends` has no rule for {cause}");
+            let help = format!("it has: {}", known.join(", "));
+            reader.problem(word.mark, message, Some(help));
+            continue;
+        };
+        changed.push(cause);
+        let Some(change) = change else { continue };
+        let before = parts.rules[index].trigger;
+        let at = At { value: cause, mark: word.mark };
+        if let Some(trigger) = trigger(at, &change.value, Some(before), reader) {
+            parts.rules[index].trigger = trigger;
+        }
+        let names = (change.value.ladder, change.value.actuator);
+        if let Some(ladder) = known_ladder(names.0, parts, reader) {
+            parts.rules[index].ladder = ladder;
+        }
+        if let Some(ladder) = known_ladder(names.1, parts, reader) {
+            parts.rules[index].actuator = Some(ladder);
+        }
+    }
+    changed
+}
+
+fn add_rules(rules: Vec<At<RuleTable>>, parts: &mut PolicyParts, reader: &mut Reader) {
+    for rule in rules {
+        let (cause, changes) = rule.value.split();
+        let cause = cause.map(|cause| cause.0);
+        if parts.rules.iter().any(|other| other.cause == cause.value) {
+            let message = format!("cause {} has two rules", cause.value);
+            let help = String::from("one rule for each; under `extends`, change it in `override`");
+            reader.problem(cause.mark, message, Some(help));
+            continue;
+        }
+        let trigger = trigger(cause.clone(), &changes, None, reader);
+        if changes.ladder.is_none() {
+            let message = format!("the rule for {} has no `ladder`", cause.value);
+            reader.problem(cause.mark, message, Some(format!("allowed: {}", names(parts))));
+        }
+        let ladder = known_ladder(changes.ladder, parts, reader);
+        let actuator = known_ladder(changes.actuator, parts, reader);
+        if let (Some(trigger), Some(ladder)) = (trigger, ladder) {
+            parts.rules.push(Rule { cause: cause.value, trigger, ladder, actuator });
+        }
+    }
+}
+
+fn names(parts: &PolicyParts) -> String {
+    let names: Vec<&str> = parts.ladders.iter().map(|(name, _)| name.as_str()).collect();
+    names.join(", ")
+}
+
+/// The ladder that is named, when it is there.
+fn known_ladder(
+    given: Option<At<String>>,
+    parts: &PolicyParts,
+    reader: &mut Reader,
+) -> Option<String> {
+    let given = given?;
+    let names: Vec<&str> = parts.ladders.iter().map(|(name, _)| name.as_str()).collect();
+    if !names.contains(&given.value.as_str()) {
+        reader.unknown(given.mark, "ladder", &given.value, &names);
+        return None;
+    }
+    Some(given.value)
+}
+
+fn apply_limits(given: LimitsTable, limits: &mut Limits) {
+    if let Some(moves) = given.moves {
+        limits.moves_per_hour = moves.value.0;
+    }
+    if let Some(restarts) = given.restarts {
+        limits.restarts_per_hour = restarts.value.0;
+    }
+    if let Some(returns) = given.r#return {
+        limits.returns = returns.value;
+    }
+    if let Some(time) = given.not_back_for {
+        limits.not_back_for = time.value;
+    }
+    if let Some(time) = given.settle {
+        limits.settle = time.value;
+    }
+    if let Some(retry) = given.retry {
+        limits.retry = retry.value;
+    }
+}
