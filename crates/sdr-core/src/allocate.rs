@@ -163,7 +163,7 @@ pub struct Placement {
 }
 
 /// One component without a home.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Homeless {
     /// Which component.
     pub component: ComponentKey,
@@ -172,7 +172,7 @@ pub struct Homeless {
 }
 
 /// Why a component cannot go to a robot: the number and the bar.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
     /// The robot.
     pub robot: RobotId,

@@ -59,6 +59,8 @@ pub struct SystemRecord {
     pub connections: u16,
     /// Whether it should run; an undeployed system stays as a tombstone.
     pub wanted: bool,
+    /// The revision since which it is wanted without a break: homes chosen before are void.
+    pub since: u64,
 }
 
 /// Where one component should run.

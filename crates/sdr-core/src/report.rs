@@ -8,6 +8,7 @@ use core::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    allocate::Homeless,
     id::{ComponentKey, Name, RobotId},
     lifecycle::LifecycleState,
     order::Token,
@@ -133,4 +134,6 @@ pub enum Report {
     Instance(InstanceReport),
     /// Trouble.
     Condition(ConditionReport),
+    /// The coordinator found no home for a component.
+    Homeless(Homeless),
 }

@@ -30,6 +30,7 @@ impl Brain {
         if !self.is_coordinator() || self.desk.is_minting() || self.desk.is_broken() {
             return;
         }
+        self.plans.give_up_late(now);
         self.advance_moves(now);
         if self.desk.is_minting() || self.plans.asked.is_some() || !self.may_begin(now) {
             return;
@@ -125,7 +126,8 @@ impl Brain {
                 (key, version)
             })
             .collect();
-        self.plans.asked = Some(Asked { plan, system: system.name.clone(), purpose, versions });
+        self.plans.asked =
+            Some(Asked { plan, at: now, system: system.name.clone(), purpose, versions });
         self.effects.push_back(Effect::Plan { plan, problem: Box::new(problem) });
         true
     }
@@ -183,7 +185,7 @@ impl Brain {
             }
         }
         for placement in &plan.placements {
-            self.plans.refusals.remove(&placement.component);
+            self.unsay_homeless(&placement.component);
             let reason = placed_reason(asked, placement);
             let event = Event::new("placed", &self.me, reason).about(&placement.component);
             #[expect(clippy::cast_precision_loss, reason = "memory stays below 2^53 bytes")]

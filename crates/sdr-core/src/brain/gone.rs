@@ -19,6 +19,13 @@ impl Brain {
         self.push_event(event.number("silent_ms", age.as_secs_f64() * 1000.0));
     }
 
+    /// Whether a robot was heard and is silent now; one that was never heard since the start
+    /// gets the same time to speak.
+    pub(super) fn is_gone(&self, robot: &RobotId, now: Instant) -> bool {
+        let waited = now >= self.started_at + self.config.gone_after;
+        !self.mesh.is_alive(robot) && (waited || self.mesh.age(robot, now).is_some())
+    }
+
     /// Components of `system` whose home is gone and which its policy wants elsewhere.
     pub(super) fn orphans(&self, now: Instant, system: &Name) -> Vec<(ComponentKey, String)> {
         let Some(running) = self.systems.get(system) else { return Vec::new() };
@@ -26,7 +33,7 @@ impl Brain {
         for spec in &running.components {
             let component = running.key(&spec.name);
             let Some(home) = self.home(&component) else { continue };
-            if self.mesh.is_alive(home) {
+            if !self.is_gone(home, now) {
                 continue;
             }
             let reason = format!("{home} is not heard any more");

@@ -7,7 +7,7 @@ use alloc::{
     vec::Vec,
 };
 
-use super::Brain;
+use super::{Brain, judge::RestartPlan};
 use crate::{
     effect::Command,
     event::Event,
@@ -24,6 +24,9 @@ use crate::{
 pub(super) const RUNS_RESERVED: Run = 16;
 /// A prepared instance counts as ready so long after it became inactive, matched or not.
 const MATCH_WAIT: Duration = Duration::from_millis(500);
+
+/// Pause before a prepared instance that failed is started again.
+const PREPARE_AGAIN: Duration = Duration::from_millis(500);
 
 /// What this robot told an instance last.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -186,8 +189,14 @@ impl Brain {
         self.raise(key, cause, reason);
     }
 
-    /// Notes a fault of a component for the next judgement.
+    /// Notes a fault of a component for the next judgement; what is only prepared here is
+    /// simply tried again after a pause.
     fn raise(&mut self, key: &ComponentKey, cause: Cause, reason: String) {
+        if self.home(key) != Some(&self.me) {
+            let at = self.handled_at + PREPARE_AGAIN;
+            self.restarts.insert(key.clone(), RestartPlan { at });
+            return;
+        }
         self.faults.insert(key.clone(), Fault { cause, reason });
         self.judge_due = true;
     }

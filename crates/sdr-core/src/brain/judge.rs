@@ -7,6 +7,7 @@ use super::Brain;
 use crate::{
     event::Event,
     id::{ComponentKey, Name},
+    lifecycle::LifecycleState,
     mesh::{AuthorKey, Push},
     recover::{
         Cause, CauseStatus, Evidence, Recovery, Remedy, RemedyOutcome, RobotEvidence, Verdict,
@@ -171,6 +172,7 @@ impl Brain {
     fn restart(&mut self, now: Instant, verdict: &Verdict, after: Duration) {
         let key = &verdict.component;
         self.held.remove(key);
+        self.call_off(key);
         let text = format!("{}: {}", verdict.cause, verdict.reason);
         let event = Event::new("restart", &self.me, text).about(key);
         self.push_event(event.number("after_ms", millis(after)));
@@ -181,6 +183,15 @@ impl Brain {
                 self.kill(id);
             } else {
                 self.finish(id);
+            }
+        }
+    }
+
+    /// A component is tried here again: it need not leave for an event of before.
+    fn call_off(&mut self, key: &ComponentKey) {
+        for ((system, cause), condition) in &mut self.conditions {
+            if is_event(*cause) && *system == key.system {
+                condition.components.retain(|name| *name != key.name);
             }
         }
     }
@@ -199,16 +210,15 @@ impl Brain {
             held_over_ms: u64::try_from(over.as_millis()).unwrap_or(u64::MAX),
         });
         condition.remedy = verdict.remedy;
+        let raised = format!("{}: {}", verdict.cause, verdict.reason);
+        self.said.note_condition(&verdict.component, &raised, self.handled_at);
         if condition.components.contains(&name) {
             return;
         }
         condition.components.push(name);
-        let event = Event::new("condition-raised", &self.me, &*verdict.reason);
+        let event = Event::new("condition-raised", &self.me, raised);
         let event = event.about(&verdict.component);
-        let event = event.number("held_over_ns", nanos(verdict.held_over_at));
-        self.push_event(event.number("cause", f64::from(verdict.cause as u8)));
-        let raised = format!("{}: {}", verdict.cause, verdict.reason);
-        self.said.note_condition(&verdict.component, &raised, self.handled_at);
+        self.push_event(event.number("held_over_ns", nanos(verdict.held_over_at)));
     }
 
     /// Takes conditions back whose components left, or whose cause is over; says the others.
@@ -221,8 +231,13 @@ impl Brain {
             condition.components.retain(|name| {
                 let key = ComponentKey::new(system, name);
                 let here = self.home(&key) == Some(&self.me);
-                let lasting = is_event(*cause) && self.current(&key).is_none();
-                here && (lasting || still_raised(&standing, &key, *cause))
+                let active = self
+                    .current(&key)
+                    .is_some_and(|id| self.instances[&id].state == LifecycleState::Active);
+                here && match is_event(*cause) {
+                    true => !active,
+                    false => still_raised(&standing, &key, *cause),
+                }
             });
             if condition.components.is_empty() {
                 over.push((system.clone(), *cause));

@@ -3,7 +3,12 @@
 //! The state of a move lives in the assignments (a target stands among the standbys), so
 //! that a new coordinator goes on where the last one stopped.
 
-use alloc::{format, string::ToString, vec, vec::Vec};
+use alloc::{
+    format,
+    string::{String, ToString},
+    vec,
+    vec::Vec,
+};
 
 use super::{
     Brain,
@@ -30,6 +35,15 @@ pub(super) struct MoveWatch {
     epoch: Option<Epoch>,
 }
 
+/// What the home before does when it hears of the new one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Old {
+    /// Goes on until the consumers have switched.
+    Drains,
+    /// Stops its output at once.
+    Stops,
+}
+
 impl Brain {
     /// Gives homes under new epochs at once: nobody runs these components now.
     pub(super) fn assign(&mut self, asked: &Asked, plan: &Plan) {
@@ -41,6 +55,7 @@ impl Brain {
                     &placement.component,
                     &placement.robot,
                     placed_reason(asked, placement),
+                    Old::Stops,
                 )
             })
             .collect();
@@ -62,7 +77,7 @@ impl Brain {
                 .is_some_and(|report| report.state == LifecycleState::Active);
             let record = match runs {
                 true => self.with_standby(placement, &reason),
-                false => self.new_home(key, &placement.robot, reason.clone()),
+                false => self.new_home(key, &placement.robot, reason.clone(), Old::Stops),
             };
             let Some(record) = record else { continue };
             let epoch = record.version.epoch.clone().filter(|_| !runs);
@@ -114,7 +129,8 @@ impl Brain {
         let mut records = Vec::new();
         for (key, target) in ready {
             let reason = self.wanted(key).map(|(_, assignment)| assignment.reason.clone());
-            let Some(record) = self.new_home(key, target, reason.unwrap_or_default()) else {
+            let Some(record) = self.new_home(key, target, reason.unwrap_or_default(), Old::Drains)
+            else {
                 continue;
             };
             if let Some(watch) = self.moves.get_mut(key) {
@@ -177,7 +193,8 @@ impl Brain {
         &self,
         key: &ComponentKey,
         home: &RobotId,
-        reason: alloc::string::String,
+        reason: String,
+        old: Old,
     ) -> Option<FleetRecord> {
         let deployment = self.systems.get(&key.system)?.revision;
         let before = self.assignment(key).map(|(version, old)| (version.clone(), old.clone()));
@@ -185,7 +202,9 @@ impl Brain {
             Some((Version { epoch: Some(epoch), .. }, _)) => epoch.next(&self.me),
             Some(_) | None => Epoch::first(&self.me),
         };
-        let drains = before.map(|(_, old)| old.home).filter(|old| old != home);
+        let drains = before
+            .map(|(_, before)| before.home)
+            .filter(|before| before != home && old == Old::Drains);
         let value = Assignment {
             component: key.clone(),
             home: home.clone(),

@@ -20,6 +20,9 @@ const RETRY_MIN: Duration = Duration::from_millis(500);
 /// Longest pause.
 const RETRY_MAX: Duration = Duration::from_secs(10);
 
+/// An answer that takes longer is not waited for.
+const ANSWER_MAX: Duration = Duration::from_secs(10);
+
 /// Why a plan was asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
@@ -35,6 +38,7 @@ pub(super) enum Purpose {
 #[derive(Clone, Debug)]
 pub(super) struct Asked {
     pub(super) plan: PlanId,
+    pub(super) at: Instant,
     pub(super) system: Name,
     pub(super) purpose: Purpose,
     /// Versions of the items' assignments when the question was asked; a changed one makes
@@ -62,6 +66,11 @@ impl PlanDesk {
     pub(super) fn next_id(&mut self) -> PlanId {
         self.last += 1;
         self.last
+    }
+
+    /// Gives up on an answer that does not come.
+    pub(super) fn give_up_late(&mut self, now: Instant) {
+        self.asked.take_if(|asked| now.since(asked.at) >= ANSWER_MAX);
     }
 
     /// Whether a question about this may be asked now.
@@ -96,7 +105,8 @@ impl PlanDesk {
     }
 
     pub(super) fn next_deadline(&self) -> Option<Instant> {
-        self.retries.values().map(|retry| retry.at).min()
+        let late = self.asked.as_ref().map(|asked| asked.at + ANSWER_MAX);
+        self.retries.values().map(|retry| retry.at).chain(late).min()
     }
 }
 

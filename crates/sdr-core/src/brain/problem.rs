@@ -163,7 +163,11 @@ impl Brain {
         let Some(author) = self.mesh.authors().author(robot) else { return Vec::new() };
         let instances = author.reports().filter_map(|report| match report {
             Report::Instance(instance) => Some(instance.clone()),
-            Report::Facts(_) | Report::Host(_) | Report::Link(..) | Report::Condition(_) => None,
+            Report::Facts(_)
+            | Report::Host(_)
+            | Report::Link(..)
+            | Report::Condition(_)
+            | Report::Homeless(_) => None,
         });
         instances.collect()
     }

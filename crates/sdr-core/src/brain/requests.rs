@@ -79,6 +79,7 @@ impl Brain {
             components: 0,
             connections: 0,
             wanted: false,
+            since: revision,
         });
         let version = self.deployment_version(revision);
         let record = FleetRecord::new(RecordKind::SYSTEM, name.as_str().into(), version, &value);
@@ -111,6 +112,7 @@ impl Brain {
             components: count(system.components.len()),
             connections: count(system.connections.len()),
             wanted: true,
+            since: self.systems.get(&system.name).map_or(revision, |before| before.since),
         });
         let mut parts = alloc::vec![
             (RecordKind::SYSTEM, system.name.to_string(), own),

@@ -8,6 +8,7 @@ use alloc::{
 
 use super::{Brain, judge::Calls};
 use crate::{
+    allocate::Homeless,
     id::{ComponentKey, RobotId},
     input::InstanceId,
     mesh::{AuthorKey, Push},
@@ -26,6 +27,9 @@ const MEMORY_STEP: Bytes = Bytes(8_000_000);
 const CPU_STEP: u32 = 100;
 /// A change of the radio that is said at once, tenths of a dBm.
 const RSSI_STEP: u16 = 10;
+
+/// Refusals of one component that others hear of; all of them stand in the event.
+const REFUSALS_TOLD: usize = 8;
 
 /// What was said last, and what is worth saying again.
 #[derive(Clone, Debug, Default)]
@@ -70,6 +74,7 @@ impl Brain {
 
     pub(super) fn say(&mut self, now: Instant) {
         self.update_readiness(now);
+        self.unsay_unwanted();
         self.say_instances();
         self.say_host(now);
         self.say_links(now);
@@ -128,6 +133,36 @@ impl Brain {
             }
             self.mesh.retract(&AuthorKey::instance(&key));
         }
+    }
+
+    /// Says as coordinator why a component has no home; false when that was known.
+    pub(super) fn say_homeless(&mut self, homeless: &Homeless) -> bool {
+        let refusals = homeless.refusals.clone();
+        let known = self.plans.refusals.insert(homeless.component.clone(), refusals);
+        if known.as_ref() == Some(&homeless.refusals) {
+            return false;
+        }
+        let mut short = homeless.clone();
+        short.refusals.truncate(REFUSALS_TOLD);
+        self.mesh.report(&Report::Homeless(short), Push::Now);
+        true
+    }
+
+    /// A component has a home, or is not wanted any more.
+    pub(super) fn unsay_homeless(&mut self, key: &ComponentKey) {
+        if self.plans.refusals.remove(key).is_some() {
+            self.mesh.retract(&AuthorKey::homeless(key));
+        }
+    }
+
+    /// Takes back what was said of components that nobody wants any more.
+    fn unsay_unwanted(&mut self) {
+        let gone = |key: &&ComponentKey| {
+            let system = self.systems.get(&key.system);
+            system.and_then(|system| system.component(&key.name)).is_none()
+        };
+        let gone: Vec<ComponentKey> = self.plans.refusals.keys().filter(gone).cloned().collect();
+        gone.iter().for_each(|key| self.unsay_homeless(key));
     }
 
     /// The report of an instance here, as it is now.

@@ -8,8 +8,9 @@ use alloc::{
 
 use super::{Brain, systems::SystemNow};
 use crate::{
+    allocate::Refusal,
     api::{ComponentView, ConditionView, ConnectionView, RobotView, StatusView, SystemView},
-    id::RobotId,
+    id::{ComponentKey, RobotId},
     report::Report,
     spec::ComponentSpec,
     time::{Duration, Instant},
@@ -52,9 +53,11 @@ impl Brain {
                     Report::Condition(condition) => {
                         Some(format!("{}: {}", condition.cause, condition.reason))
                     }
-                    Report::Facts(_) | Report::Host(_) | Report::Link(..) | Report::Instance(_) => {
-                        None
-                    }
+                    Report::Facts(_)
+                    | Report::Host(_)
+                    | Report::Link(..)
+                    | Report::Instance(_)
+                    | Report::Homeless(_) => None,
                 })
                 .collect(),
         }
@@ -93,7 +96,7 @@ impl Brain {
         let epoch = wanted.and_then(|(version, _)| version.epoch.clone());
         let usage = report.as_ref().map(|report| report.usage).unwrap_or_default();
         let token = report.as_ref().and_then(|report| report.token.clone());
-        let refusals = self.plans.refusals.get(&key).cloned().unwrap_or_default();
+        let refusals = self.refusals_of(&key);
         let why = wanted.map(|(_, assignment)| assignment.reason.clone());
         let held = self.held.get(&key).map(|held| format!("held: {held}"));
         let call = self.call_of(&key);
@@ -115,6 +118,25 @@ impl Brain {
             reason: held.or(call).or(why).unwrap_or_else(|| String::from("not placed yet")),
             refusals,
         }
+    }
+
+    /// Why a component has no home, as the coordinator says.
+    fn refusals_of(&self, key: &ComponentKey) -> Vec<Refusal> {
+        if self.is_coordinator() {
+            return self.plans.refusals.get(key).cloned().unwrap_or_default();
+        }
+        let author = self.role().and_then(|role| self.mesh.authors().author(&role.holder));
+        let mut reports = author.into_iter().flat_map(|author| author.reports());
+        let found = reports.find_map(|report| match report {
+            Report::Homeless(homeless) if homeless.component == *key => Some(&homeless.refusals),
+            Report::Homeless(_)
+            | Report::Facts(_)
+            | Report::Host(_)
+            | Report::Link(..)
+            | Report::Instance(_)
+            | Report::Condition(_) => None,
+        });
+        found.cloned().unwrap_or_default()
     }
 
     fn condition_views(&self, now: Instant) -> Vec<ConditionView> {

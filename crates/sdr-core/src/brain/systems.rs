@@ -15,6 +15,8 @@ use crate::{
 pub(super) struct SystemNow {
     pub(super) name: Name,
     pub(super) revision: u64,
+    /// Homes chosen before this revision are void.
+    pub(super) since: u64,
     pub(super) receiver: RobotId,
     /// In the order of the file.
     pub(super) components: Vec<ComponentSpec>,
@@ -111,6 +113,7 @@ impl Brain {
         Some(SystemNow {
             name: record.name.clone(),
             revision,
+            since: record.since,
             receiver: record.receiver.clone(),
             components,
             connections,
@@ -129,8 +132,9 @@ impl Brain {
 
     /// The assignment of a component whose system is wanted and whose home is chosen.
     pub(super) fn wanted(&self, key: &ComponentKey) -> Option<(&Version, &Assignment)> {
-        self.systems.get(&key.system)?.component(&key.name)?;
-        self.assignment(key)
+        let system = self.systems.get(&key.system)?;
+        system.component(&key.name)?;
+        self.assignment(key).filter(|(_, assignment)| assignment.deployment >= system.since)
     }
 
     pub(super) fn home(&self, key: &ComponentKey) -> Option<&RobotId> {
@@ -151,7 +155,8 @@ impl Brain {
             | crate::report::Report::Facts(_)
             | crate::report::Report::Host(_)
             | crate::report::Report::Link(..)
-            | crate::report::Report::Condition(_) => None,
+            | crate::report::Report::Condition(_)
+            | crate::report::Report::Homeless(_) => None,
         })
     }
 
@@ -161,7 +166,8 @@ impl Brain {
             crate::report::Report::Instance(_)
             | crate::report::Report::Host(_)
             | crate::report::Report::Link(..)
-            | crate::report::Report::Condition(_) => None,
+            | crate::report::Report::Condition(_)
+            | crate::report::Report::Homeless(_) => None,
         })
     }
 
@@ -171,7 +177,8 @@ impl Brain {
             crate::report::Report::Instance(_)
             | crate::report::Report::Facts(_)
             | crate::report::Report::Link(..)
-            | crate::report::Report::Condition(_) => None,
+            | crate::report::Report::Condition(_)
+            | crate::report::Report::Homeless(_) => None,
         })
     }
 

@@ -53,6 +53,11 @@ impl AuthorKey {
         Self(format!("c/{system}/{cause}"))
     }
 
+    /// The key of what the coordinator says of a component without a home.
+    pub fn homeless(component: &ComponentKey) -> Self {
+        Self(format!("n/{component}"))
+    }
+
     fn of(report: &Report) -> Self {
         match report {
             Report::Facts(_) => Self(String::from("f")),
@@ -60,6 +65,7 @@ impl AuthorKey {
             Report::Link(robot, _) => Self(format!("l/{robot}")),
             Report::Instance(instance) => Self::instance(&instance.component),
             Report::Condition(condition) => Self::condition(&condition.system, condition.cause),
+            Report::Homeless(homeless) => Self::homeless(&homeless.component),
         }
     }
 }

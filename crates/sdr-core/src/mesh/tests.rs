@@ -102,9 +102,11 @@ impl Bench {
         let author = self.meshes[by].as_ref().unwrap().authors().author(&robot(of))?;
         author.reports().find_map(|report| match report {
             Report::Host(host) => Some(*host),
-            Report::Facts(_) | Report::Link(..) | Report::Instance(_) | Report::Condition(_) => {
-                None
-            }
+            Report::Facts(_)
+            | Report::Link(..)
+            | Report::Instance(_)
+            | Report::Condition(_)
+            | Report::Homeless(_) => None,
         })
     }
 }
