@@ -24,7 +24,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::{
-    command::{completions, events, logs, status, undeploy},
+    command::{completions, deploy, events, logs, status, undeploy, validate},
     failure::Failure,
     output::{Format, Output},
 };
@@ -53,8 +53,12 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Check a system file and have the fleet run it
+    Deploy(deploy::DeployArgs),
     /// Have the fleet end a system
     Undeploy(undeploy::UndeployArgs),
+    /// Check files: systems, robot.toml, policies
+    Validate(validate::ValidateArgs),
     /// Show robots, systems and what is wrong with them
     Status(status::StatusArgs),
     /// Show what happened and was decided, with reasons
@@ -82,7 +86,9 @@ fn main() -> ExitCode {
 
 async fn run(command: Command, session: &Session) -> Result<ExitCode, Failure> {
     match command {
+        Command::Deploy(args) => deploy::run(args, session).await,
         Command::Undeploy(args) => undeploy::run(args, session).await,
+        Command::Validate(args) => validate::run(args, session).await,
         Command::Status(args) => status::run(args, session).await,
         Command::Events(args) => events::run(args, session).await,
         Command::Logs(args) => logs::run(args, session).await,

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path, process::Stdio, time::Duration};
 
-use sdr_core::spec::{ComponentProfile, Launch, SystemSpec};
+use sdr_core::spec::{ComponentProfile, SystemSpec};
 use serde::Deserialize;
 use tokio::{io::AsyncReadExt, process::Command, time::timeout};
 
@@ -28,15 +28,8 @@ pub(super) async fn profiles(
     system: &SystemSpec,
     folder: &Path,
 ) -> (Vec<ComponentProfile>, Vec<String>) {
-    let mut names: Vec<&str> = Vec::new();
-    for component in &system.components {
-        let Launch::Native { executable, .. } = &component.launch;
-        if !names.contains(&executable.as_str()) {
-            names.push(executable);
-        }
-    }
     let (mut found, mut missing) = (Vec::new(), Vec::new());
-    for name in names {
+    for name in executables(system) {
         match describe(&folder.join(name)).await {
             Ok(mut profile) => {
                 // It is launched by its file name, whatever it calls itself.
@@ -47,6 +40,18 @@ pub(super) async fn profiles(
         }
     }
     (found, missing)
+}
+
+/// What the system launches, each once, in the order of the file.
+pub(super) fn executables(system: &SystemSpec) -> Vec<&str> {
+    let mut names = Vec::new();
+    for component in &system.components {
+        let name = component.launch.name();
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
 }
 
 async fn describe(program: &Path) -> Result<ComponentProfile, String> {

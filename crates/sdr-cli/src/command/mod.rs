@@ -1,14 +1,15 @@
 //! One file a command: its arguments and what it does.
 
 pub(crate) mod completions;
-// pub(crate) mod deploy;
+pub(crate) mod deploy;
 pub(crate) mod events;
 pub(crate) mod logs;
 pub(crate) mod status;
 pub(crate) mod undeploy;
-// pub(crate) mod validate;
+pub(crate) mod validate;
 
 mod await_system;
 mod awaited;
 mod describe;
 mod duration;
+mod problems;

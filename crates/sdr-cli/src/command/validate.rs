@@ -9,7 +9,10 @@ use clap::ValueEnum;
 use sdr_files::Problems;
 use serde::Serialize;
 
-use super::{describe, problems::ProblemReport};
+use super::{
+    describe::{self, ComponentsView},
+    problems::ProblemReport,
+};
 use crate::{
     Session, client::Client, failure::Failure, locate, output::Format, render::units::count,
 };
@@ -82,12 +85,7 @@ pub(crate) async fn run(args: ValidateArgs, session: &Session) -> Result<ExitCod
     tell(&reports, session)
 }
 
-fn report(
-    file: &Path,
-    kind: Kind,
-    found: Option<&Problems>,
-    unchecked: Vec<String>,
-) -> FileReport {
+fn report(file: &Path, kind: Kind, found: Option<&Problems>, unchecked: Vec<String>) -> FileReport {
     let problems = found.map(Problems::as_slice).unwrap_or_default();
     FileReport {
         file: file.display().to_string(),
@@ -112,7 +110,11 @@ fn tell(reports: &[FileReport], session: &Session) -> Result<ExitCode, Failure> 
                     true => "fine".into(),
                     false => count(report.problems.len(), "problem"),
                 };
-                session.output.line(&format!("{}: {}, {verdict}", report.file, report.kind.word()))?;
+                session.output.line(&format!(
+                    "{}: {}, {verdict}",
+                    report.file,
+                    report.kind.word()
+                ))?;
                 for reason in &report.unchecked {
                     session.output.line(&format!("  not checked: {reason}"))?;
                 }
@@ -149,21 +151,21 @@ async fn system(
     components: Option<&Path>,
     session: &Session,
 ) -> Result<(Option<Problems>, Vec<String>), Failure> {
-    let loaded = match sdr_files::load_system(file) {
+    let mut loaded = match sdr_files::load_system(file) {
         Ok(loaded) => loaded,
         Err(found) => return Ok((Some(found), Vec::new())),
     };
-    let folder = match components {
-        Some(folder) => folder.to_path_buf(),
+    let (profiles, missing) = match components {
+        Some(folder) => describe::profiles(&loaded.spec, folder).await,
         None if session.agent.is_some() => {
-            let profiles: Vec<_> = Client::of(session)?.get("/v1/components").await?;
-            return Ok((sdr_files::link_profiles(&loaded, &profiles).err(), Vec::new()));
+            let there: ComponentsView = Client::of(session)?.get("/v1/components").await?;
+            (there.components, Vec::new())
         }
-        None => locate::folder()?,
+        None => describe::profiles(&loaded.spec, &locate::folder()?).await,
     };
-    let (profiles, missing) = describe::profiles(loaded.spec(), &folder).await;
-    if missing.is_empty() {
-        return Ok((sdr_files::link_profiles(&loaded, &profiles).err(), Vec::new()));
+    // Half of the profiles would make problems of ports that are fine.
+    if !missing.is_empty() {
+        return Ok((None, missing));
     }
-    Ok((None, missing))
+    Ok((sdr_files::link_profiles(&mut loaded, &profiles).err(), Vec::new()))
 }
