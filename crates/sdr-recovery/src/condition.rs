@@ -171,6 +171,19 @@ impl Level {
             Self::Time(time) => i64::try_from(time.as_nanos()).unwrap_or(i64::MAX),
         }
     }
+
+    /// A level of the same unit from its number.
+    pub(crate) fn with_raw(self, raw: i64) -> Self {
+        let size = u64::try_from(raw).unwrap_or(0);
+        match self {
+            Self::Memory(_) => Self::Memory(Bytes(size)),
+            Self::Share(_) => Self::Share(Permille(u32::try_from(size).unwrap_or(u32::MAX))),
+            Self::Signal(_) => {
+                Self::Signal(Dbm::from_tenths(i16::try_from(raw).unwrap_or(i16::MIN)))
+            }
+            Self::Time(_) => Self::Time(Duration::from_nanos(size)),
+        }
+    }
 }
 
 impl fmt::Display for Level {

@@ -31,8 +31,9 @@ pub struct PolicyParts {
     pub name: String,
     /// Ladders by name.
     pub ladders: Vec<(String, Ladder)>,
-    /// What to watch, at most one rule for each cause. Earlier rules win when several
-    /// causes of one component stand at once.
+    /// What to watch, at most one rule for each cause. When several causes of one component
+    /// stand at once, the one whose ladder begins with the most severe rung wins, then the
+    /// earlier rule.
     pub rules: Vec<Rule>,
     /// Bounds over all rules.
     pub limits: Limits,

@@ -1,0 +1,292 @@
+//! The engine: fresh evidence of all components in, what should be done now out.
+
+use alloc::{boxed::Box, collections::BTreeMap, format, string::String, vec::Vec};
+use core::time::Duration;
+
+use sdr_core::{
+    id::ComponentKey,
+    recover::{Cause, CauseStatus, Evidence, Fault, Recovery, RemedyOutcome, Verdict},
+    spec::PolicyBytes,
+    time::Instant,
+};
+
+use crate::{
+    budget::Budget,
+    climb::Trouble,
+    condition::Fact,
+    ladder::Rung,
+    policy::{Policy, Rule, Trigger},
+    sustain::{Stage, Sustain},
+    watch::{Scene, Watch, condition_reason, is_of_robot, sustain},
+};
+
+/// Longest reason of a fault that is passed on, in characters.
+const REASON_MAX: usize = 200;
+
+/// Makes the engine of a policy, as the brain takes it; the error is for people.
+pub fn make(policy: &PolicyBytes) -> Result<Box<dyn Recovery + Send>, String> {
+    match Policy::decode(policy) {
+        Ok(read) => Ok(Box::new(Engine::new(read))),
+        Err(error) => Err(format!("recovery policy `{}`: {error}", policy.name)),
+    }
+}
+
+/// Judges the components of one system by a policy.
+#[derive(Debug)]
+pub struct Engine {
+    policy: Policy,
+    /// Conditions of the robot, by rule: shared, so that all components leave together.
+    robot: BTreeMap<usize, Sustain>,
+    watches: BTreeMap<ComponentKey, Watch>,
+    /// Moves are remembered when their component has left, so that it cannot be thrown back
+    /// and forth for ever.
+    moves: BTreeMap<ComponentKey, Budget>,
+    judged_at: Instant,
+}
+
+impl Engine {
+    /// An engine at rest.
+    pub fn new(policy: Policy) -> Self {
+        Self {
+            policy,
+            robot: BTreeMap::new(),
+            watches: BTreeMap::new(),
+            moves: BTreeMap::new(),
+            judged_at: Instant::ZERO,
+        }
+    }
+
+    fn feed(&mut self, now: Instant, evidence: &[Evidence]) {
+        // Nothing is known of the robot of a component that is gone.
+        let here = evidence.iter().find(|one| !is_gone(one));
+        for (index, rule) in self.policy.parts().rules.iter().enumerate() {
+            let Trigger::Condition(condition) = rule.trigger else {
+                continue;
+            };
+            if is_shared(condition.fact) {
+                if let Some(here) = here {
+                    let sustain =
+                        self.robot.entry(index).or_insert_with(|| Sustain::new(condition));
+                    sustain.feed(now, condition.fact.read(here));
+                }
+                continue;
+            }
+            for one in evidence {
+                let watch = self.watches.entry(one.component.clone()).or_default();
+                let sustain = watch.own.entry(index).or_insert_with(|| Sustain::new(condition));
+                sustain.feed(now, condition.fact.read(one));
+            }
+        }
+        for one in evidence {
+            let watch = self.watches.entry(one.component.clone()).or_default();
+            (watch.seen_at, watch.actuator) = (now, one.actuator);
+        }
+    }
+
+    /// For causes of the robot that are first met here, one component after the other: whose
+    /// turn it is, by rule. The largest begins, for it frees most.
+    fn turns(&self, evidence: &[Evidence]) -> BTreeMap<usize, ComponentKey> {
+        let mut turns = BTreeMap::new();
+        for (index, sustain) in &self.robot {
+            let rule = &self.policy.parts().rules[*index];
+            if !sustain.raised() || !self.is_one_by_one(rule) {
+                continue;
+            }
+            let watch = |one: &Evidence| self.watches.get(&one.component);
+            let climbs = |one: &&Evidence| {
+                let climb = watch(one).and_then(|watch| watch.climb.as_ref());
+                climb.is_some_and(|climb| climb.trouble.rule == *index)
+            };
+            let free = |one: &&Evidence| {
+                watch(one).is_some_and(|watch| {
+                    watch.climb.is_none() && !watch.is_latched() && !watch.held.contains_key(index)
+                })
+            };
+            let size = |one: &Evidence| match sustain.condition().fact {
+                Fact::RobotCpu => u64::from(one.cpu.0),
+                Fact::RobotMemoryFree
+                | Fact::RobotBattery
+                | Fact::RobotRssi
+                | Fact::ComponentCpuOfLimit
+                | Fact::ComponentCpuOfCore
+                | Fact::LinksDelay
+                | Fact::LinksJitter
+                | Fact::LinksLoss => one.memory.0,
+            };
+            let here = || evidence.iter().filter(|one| !is_gone(one));
+            let largest =
+                || here().filter(free).min_by_key(|one| (u64::MAX - size(one), &one.component));
+            if let Some(next) = here().find(climbs).or_else(largest) {
+                turns.insert(*index, next.component.clone());
+            }
+        }
+        turns
+    }
+
+    /// A cause of the robot whose ladder begins here: freeing one component may be enough.
+    fn is_one_by_one(&self, rule: &Rule) -> bool {
+        match self.policy.ladder(rule, false).rungs().first() {
+            Some(Rung::LocalStandby | Rung::Restart(_)) => is_of_robot(rule),
+            Some(Rung::StandbyElsewhere | Rung::LaunchElsewhere | Rung::Hold) | None => false,
+        }
+    }
+
+    /// Causes that stand for a component now.
+    fn troubles(
+        &self,
+        now: Instant,
+        one: &Evidence,
+        turns: &BTreeMap<usize, ComponentKey>,
+    ) -> Vec<Trouble> {
+        let Some(watch) = self.watches.get(&one.component) else {
+            return Vec::new();
+        };
+        let trouble = |(index, rule): (usize, &Rule)| match rule.trigger {
+            Trigger::Fault => {
+                let fault = one.fault.as_ref().filter(|fault| fault.cause == rule.cause)?;
+                let reason = fault_reason(fault);
+                Some(Trouble { rule: index, since: now, held_over_at: now, reason })
+            }
+            Trigger::Condition(condition) => {
+                let seen = sustain(&watch.own, &self.robot, index)?;
+                let known = !is_gone(one) && condition.fact.read(one).is_some();
+                let turn = !self.robot.contains_key(&index)
+                    || !self.is_one_by_one(rule)
+                    || turns.get(&index) == Some(&one.component);
+                let held_over_at = seen.held_over_at().filter(|_| known && turn)?;
+                let since = held_over_at - condition.hold;
+                let reason = condition_reason(seen, now);
+                Some(Trouble { rule: index, since, held_over_at, reason })
+            }
+        };
+        self.policy.parts().rules.iter().enumerate().filter_map(trouble).collect()
+    }
+}
+
+impl Recovery for Engine {
+    fn judge(&mut self, now: Instant, evidence: &[Evidence]) -> Vec<Verdict> {
+        self.judged_at = now;
+        self.feed(now, evidence);
+        let turns = self.turns(evidence);
+        let mut verdicts = Vec::new();
+        for one in evidence {
+            let troubles = self.troubles(now, one, &turns);
+            let Some(watch) = self.watches.get_mut(&one.component) else {
+                continue;
+            };
+            let moves = self.moves.entry(one.component.clone()).or_default();
+            let mut scene =
+                Scene { now, policy: &self.policy, robot: &self.robot, evidence: one, moves };
+            verdicts.extend(watch.judge(&mut scene, troubles));
+        }
+        self.moves.retain(|_, moves| !moves.is_idle(now));
+        verdicts
+    }
+
+    fn outcome(&mut self, now: Instant, component: &ComponentKey, outcome: RemedyOutcome) {
+        let Some(watch) = self.watches.get_mut(component) else {
+            return;
+        };
+        let Some(climb) = &mut watch.climb else {
+            return;
+        };
+        let parts = self.policy.parts();
+        let rule = &parts.rules[climb.trouble.rule];
+        let ladder = self.policy.ladder(rule, watch.actuator);
+        if climb.outcome(now, outcome, (ladder, &parts.limits, is_of_robot(rule))) {
+            watch.missed = None;
+            let moves = self.moves.entry(component.clone()).or_default();
+            moves.spend(now, parts.limits.moves_per_hour);
+        }
+    }
+
+    fn forget(&mut self, component: &ComponentKey) {
+        let Some(watch) = self.watches.remove(component) else {
+            return;
+        };
+        if let Some(climb) = watch.climb {
+            let parts = self.policy.parts();
+            let ladder = self.policy.ladder(&parts.rules[climb.trouble.rule], watch.actuator);
+            if climb.is_leaving(ladder) {
+                let moves = self.moves.entry(component.clone()).or_default();
+                moves.spend(self.judged_at, parts.limits.moves_per_hour);
+            }
+        }
+        if self.watches.is_empty() {
+            // Nobody looks from now on, so nothing is known of the time until somebody does.
+            self.robot.clear();
+        }
+    }
+
+    fn next_deadline(&self) -> Option<Instant> {
+        // What was not shown in the last call could not act on its deadline either.
+        let due = |watch: &Watch| {
+            let deadline = watch.deadline(self.judged_at);
+            deadline.filter(|at| watch.seen_at == self.judged_at || *at > self.judged_at)
+        };
+        let robot = self.robot.values().filter_map(|sustain| sustain.deadline(self.judged_at));
+        robot.chain(self.watches.values().filter_map(due)).min()
+    }
+
+    fn standing(&self) -> Vec<CauseStatus> {
+        let mut standing = Vec::new();
+        for (component, watch) in &self.watches {
+            for (index, rule) in self.policy.parts().rules.iter().enumerate() {
+                let (component, cause) = (component.clone(), rule.cause);
+                let status = match sustain(&watch.own, &self.robot, index) {
+                    Some(seen) => condition_status(seen, self.judged_at),
+                    None => fault_status(watch, index),
+                };
+                if let Some((since, hold, raised, reason)) = status {
+                    let status = CauseStatus { component, cause, since, hold, raised, reason };
+                    standing.push(status);
+                }
+            }
+        }
+        standing
+    }
+
+    fn not_back_for(&self) -> Duration {
+        self.policy.parts().limits.not_back_for
+    }
+}
+
+fn condition_status(seen: &Sustain, now: Instant) -> Option<(Instant, Duration, bool, String)> {
+    let (since, raised) = match seen.stage() {
+        Stage::Calm => return None,
+        Stage::Pending { since } => (since, false),
+        Stage::Raised { since, .. } => (since, true),
+    };
+    Some((since, seen.condition().hold, raised, condition_reason(seen, now)))
+}
+
+/// A fault stands as long as it is climbed for or held.
+fn fault_status(watch: &Watch, rule: usize) -> Option<(Instant, Duration, bool, String)> {
+    let climb = watch.climb.as_ref().map(|climb| &climb.trouble);
+    let held = watch.held.get(&rule).map(|held| &held.trouble);
+    let trouble = climb.filter(|trouble| trouble.rule == rule).or(held)?;
+    Some((trouble.since, Duration::ZERO, true, trouble.reason.clone()))
+}
+
+fn fault_reason(fault: &Fault) -> String {
+    match fault.reason.trim() {
+        "" => fault.cause.word().into(),
+        reason => reason.chars().take(REASON_MAX).collect(),
+    }
+}
+
+fn is_gone(evidence: &Evidence) -> bool {
+    evidence.fault.as_ref().is_some_and(|fault| fault.cause == Cause::RobotGone)
+}
+
+/// Whether all components of a robot see the same figure.
+fn is_shared(fact: Fact) -> bool {
+    match fact {
+        Fact::RobotMemoryFree | Fact::RobotCpu | Fact::RobotBattery | Fact::RobotRssi => true,
+        Fact::ComponentCpuOfLimit
+        | Fact::ComponentCpuOfCore
+        | Fact::LinksDelay
+        | Fact::LinksJitter
+        | Fact::LinksLoss => false,
+    }
+}

@@ -1,0 +1,267 @@
+//! One component: the conditions of its own, the climb it is on, and what it is held for.
+
+use alloc::{collections::BTreeMap, string::String, vec::Vec};
+
+use sdr_core::{
+    recover::{Cause, Evidence, Remedy, Verdict},
+    time::Instant,
+};
+
+use crate::{
+    budget::Budget,
+    climb::{Climb, Look, Order, Signs, Trouble, Way},
+    condition::Fact,
+    ladder::Rung,
+    policy::{Policy, Rule, Trigger},
+    sustain::{Stage, Sustain},
+};
+
+/// What is remembered of one component.
+#[derive(Debug, Default)]
+pub(crate) struct Watch {
+    /// Conditions of its own, by rule.
+    pub(crate) own: BTreeMap<usize, Sustain>,
+    pub(crate) climb: Option<Climb>,
+    pub(crate) held: BTreeMap<usize, Held>,
+    /// A fault that came while a move was under way; due when the move comes to nothing.
+    pub(crate) missed: Option<Trouble>,
+    /// Restarts and local switches.
+    pub(crate) restarts: Budget,
+    /// When there was evidence of it last.
+    pub(crate) seen_at: Instant,
+    /// It moves a body.
+    pub(crate) actuator: bool,
+}
+
+/// A cause that nothing more is tried for.
+#[derive(Debug)]
+pub(crate) struct Held {
+    pub(crate) trouble: Trouble,
+    at: Instant,
+    /// When a budget has room again.
+    until: Option<Instant>,
+    /// Only a reset ends it.
+    latched: bool,
+}
+
+/// The surroundings of one judgement of one component.
+pub(crate) struct Scene<'a> {
+    pub(crate) now: Instant,
+    pub(crate) policy: &'a Policy,
+    /// Conditions of the robot, by rule.
+    pub(crate) robot: &'a BTreeMap<usize, Sustain>,
+    pub(crate) evidence: &'a Evidence,
+    pub(crate) moves: &'a mut Budget,
+}
+
+impl Watch {
+    /// Says what should be done now about `troubles`, if anything.
+    pub(crate) fn judge(
+        &mut self,
+        scene: &mut Scene<'_>,
+        mut troubles: Vec<Trouble>,
+    ) -> Option<Verdict> {
+        let now = scene.now;
+        troubles.extend(self.leave_holds(scene));
+        if self.is_latched() {
+            return None;
+        }
+        troubles.retain(|trouble| !self.held.contains_key(&trouble.rule));
+        let first = |rule: usize| first_severity(scene.policy, rule, self.actuator);
+        let by_weight = |trouble: &Trouble| (first(trouble.rule), usize::MAX - trouble.rule);
+        let fault = troubles.iter().find(|trouble| is_fault(scene.policy, trouble.rule)).cloned();
+        let winner = troubles.into_iter().max_by_key(by_weight);
+        let Some(climb) = &mut self.climb else {
+            return self.start_with(scene, winner);
+        };
+        let ladder = scene.policy.ladder(&rules(scene.policy)[climb.trouble.rule], self.actuator);
+        if let Some(worse) = winner.clone().filter(|worse| {
+            worse.rule != climb.trouble.rule && first(worse.rule) > climb.severity(ladder)
+        }) {
+            return self.start(scene, worse);
+        }
+        if climb.is_leaving(ladder) || climb.is_pausing() {
+            self.missed =
+                fault.filter(|fault| fault.rule != climb.trouble.rule).or(self.missed.take());
+        }
+        if climb.is_pausing()
+            && let Some(missed) = self.missed.take()
+        {
+            // It stays here for now, so it should at least run here.
+            return self.start(scene, missed);
+        }
+        let signs = signs(&self.own, scene, climb.trouble.rule);
+        match climb.look(now, signs, ladder) {
+            Look::Wait => None,
+            Look::Step => self.step(scene),
+            Look::Over => {
+                self.climb = None;
+                self.start_with(scene, winner)
+            }
+        }
+    }
+
+    fn start_with(&mut self, scene: &mut Scene<'_>, winner: Option<Trouble>) -> Option<Verdict> {
+        let next = winner.or_else(|| self.missed.take())?;
+        self.start(scene, next)
+    }
+
+    fn start(&mut self, scene: &mut Scene<'_>, trouble: Trouble) -> Option<Verdict> {
+        self.climb = Some(Climb::new(scene.now, trouble));
+        self.step(scene)
+    }
+
+    /// Whether only a reset helps.
+    pub(crate) fn is_latched(&self) -> bool {
+        self.held.values().any(|held| held.latched)
+    }
+
+    /// When it should be judged again at the latest.
+    pub(crate) fn deadline(&self, now: Instant) -> Option<Instant> {
+        let own = self.own.values().filter_map(|sustain| sustain.deadline(now));
+        let climb = self.climb.as_ref().and_then(Climb::deadline);
+        let held = self.held.values().filter_map(|held| held.until);
+        own.chain(climb).chain(held).min()
+    }
+
+    /// Ends the holds that are over, and gives back the troubles that are to be tried again.
+    fn leave_holds(&mut self, scene: &Scene<'_>) -> Vec<Trouble> {
+        let now = scene.now;
+        let settle = scene.policy.parts().limits.settle;
+        let fault = scene.evidence.fault.is_some();
+        let mut again = Vec::new();
+        let Self { own, held, .. } = self;
+        held.retain(|rule, hold| {
+            if hold.latched {
+                return true;
+            }
+            let condition = signs(own, scene, *rule).condition;
+            let over = match condition {
+                Some(stage) => !matches!(stage, Stage::Raised { .. }),
+                // It ran again and failed again: somebody has reset it.
+                None => fault && now >= hold.at + settle,
+            };
+            let room = hold.until.is_some_and(|until| now >= until);
+            if room && !over && condition.is_none() {
+                again.push(hold.trouble.clone());
+            }
+            !over && !room
+        });
+        again
+    }
+
+    /// The next order of the climb as a verdict.
+    fn step(&mut self, scene: &mut Scene<'_>) -> Option<Verdict> {
+        let climb = self.climb.as_mut()?;
+        let rule = &rules(scene.policy)[climb.trouble.rule];
+        if let Some(sustain) = sustain(&self.own, scene.robot, climb.trouble.rule) {
+            climb.trouble.reason = condition_reason(sustain, scene.now);
+        }
+        let ladder = scene.policy.ladder(rule, self.actuator);
+        let order = climb.step(
+            scene.now,
+            &mut Way {
+                ladder,
+                limits: &scene.policy.parts().limits,
+                evidence: scene.evidence,
+                restarts: &mut self.restarts,
+                moves: scene.moves,
+                patient: is_of_robot(rule),
+            },
+        );
+        let (cause, held_over_at) = (rule.cause, climb.trouble.held_over_at);
+        let (remedy, note) = match order {
+            Order::Try(remedy, note) => (remedy, note),
+            Order::Hold { note, until } => {
+                let latched = ladder.rungs().first() == Some(&Rung::Hold);
+                let trouble = self.climb.take()?.trouble;
+                let reason = alloc::format!("{}{note}", trouble.reason);
+                let held = Held { trouble, at: scene.now, until, latched };
+                self.held.insert(held.trouble.rule, held);
+                let component = scene.evidence.component.clone();
+                return Some(Verdict {
+                    component,
+                    cause,
+                    remedy: Remedy::Hold,
+                    reason,
+                    held_over_at,
+                });
+            }
+        };
+        let reason = alloc::format!("{}{note}", self.climb.as_ref()?.trouble.reason);
+        let component = scene.evidence.component.clone();
+        Some(Verdict { component, cause, remedy, reason, held_over_at })
+    }
+}
+
+/// `rssi -54.8 dBm, bar -52.5 dBm, held 6.0 s`.
+pub(crate) fn condition_reason(sustain: &Sustain, now: Instant) -> String {
+    let condition = sustain.condition();
+    let (fact, bar) = (condition.fact.label(), condition.bar.level());
+    let found = match sustain.found(now) {
+        Some(found) => alloc::format!("{found}"),
+        None => String::from("unknown"),
+    };
+    let tenths = |time: core::time::Duration| {
+        let tenths = time.as_millis() / 100;
+        alloc::format!("{}.{}", tenths / 10, tenths % 10)
+    };
+    let held = match sustain.stage() {
+        Stage::Calm => String::from("over"),
+        Stage::Pending { since } => {
+            let (held, hold) = (tenths(now.since(since)), tenths(condition.hold));
+            alloc::format!("held {held} of {hold} s")
+        }
+        Stage::Raised { since, .. } => alloc::format!("held {} s", tenths(now.since(since))),
+    };
+    alloc::format!("{fact} {found}, bar {bar}, {held}")
+}
+
+/// Whether the fault lies with the robot or its links: then other robots are asked for ever.
+pub(crate) fn is_of_robot(rule: &Rule) -> bool {
+    match rule.trigger {
+        Trigger::Fault => rule.cause == Cause::RobotGone,
+        Trigger::Condition(condition) => match condition.fact {
+            Fact::ComponentCpuOfLimit | Fact::ComponentCpuOfCore => false,
+            Fact::RobotMemoryFree
+            | Fact::RobotCpu
+            | Fact::RobotBattery
+            | Fact::RobotRssi
+            | Fact::LinksDelay
+            | Fact::LinksJitter
+            | Fact::LinksLoss => true,
+        },
+    }
+}
+
+/// The watched condition of a rule, wherever it is kept.
+pub(crate) fn sustain<'a>(
+    own: &'a BTreeMap<usize, Sustain>,
+    robot: &'a BTreeMap<usize, Sustain>,
+    rule: usize,
+) -> Option<&'a Sustain> {
+    own.get(&rule).or_else(|| robot.get(&rule))
+}
+
+fn signs(own: &BTreeMap<usize, Sustain>, scene: &Scene<'_>, rule: usize) -> Signs {
+    let condition = sustain(own, scene.robot, rule);
+    let pending = condition.filter(|sustain| matches!(sustain.stage(), Stage::Pending { .. }));
+    Signs {
+        fault: scene.evidence.fault.is_some(),
+        condition: condition.map(Sustain::stage),
+        raised_at: pending.and_then(|sustain| sustain.deadline(scene.now)),
+    }
+}
+
+fn is_fault(policy: &Policy, rule: usize) -> bool {
+    matches!(rules(policy)[rule].trigger, Trigger::Fault)
+}
+
+fn first_severity(policy: &Policy, rule: usize, actuator: bool) -> u8 {
+    let ladder = policy.ladder(&rules(policy)[rule], actuator);
+    ladder.rungs().first().map_or(0, Rung::severity)
+}
+
+fn rules(policy: &Policy) -> &[Rule] {
+    &policy.parts().rules
+}
