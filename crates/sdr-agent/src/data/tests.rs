@@ -63,11 +63,14 @@ pub(super) fn qos(depth: u8) -> Qos {
     Qos { reliability: Reliability::Reliable, depth, deadline: None }
 }
 
+/// Ports and bodies, as the recording got them.
+type Tapped = Arc<Mutex<Vec<(String, Vec<u8>)>>>;
+
 struct Robot {
     // Dropped in this order: the bridge before its memory.
     data: Data,
     inputs: Receiver<Input>,
-    tapped: Arc<Mutex<Vec<(String, Vec<u8>)>>>,
+    tapped: Tapped,
     memory: Memory,
     _place: Place,
 }
@@ -109,7 +112,7 @@ fn until(what: &str, mut holds: impl FnMut() -> bool) {
     let since = Instant::now();
     while !holds() {
         assert!(since.elapsed() < PATIENCE, "waited for {what}");
-        std::thread::sleep(Duration::from_millis(1));
+        thread::sleep(Duration::from_millis(1));
     }
 }
 
@@ -323,7 +326,7 @@ fn images_at_fifteen_a_second_all_arrive_in_order() {
         latencies.push(sent_at.elapsed());
         assert_eq!((sample.header().sequence, sample.payload().len()), (sequence, image.len()));
         // The period of a camera; nothing is judged by it.
-        std::thread::sleep(Duration::from_micros(66_667).saturating_sub(sent_at.elapsed()));
+        thread::sleep(Duration::from_micros(66_667).saturating_sub(sent_at.elapsed()));
     }
     latencies.sort();
     let (p50, p99) = (latencies[latencies.len() / 2], latencies[latencies.len() - 1]);

@@ -9,7 +9,7 @@ pub(crate) type EndpointId = u64;
 
 /// Which way samples go, seen from this robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Way {
+pub(crate) enum Way {
     /// From a local producer to other robots.
     Out,
     /// From another robot to local consumers.
