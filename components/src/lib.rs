@@ -8,8 +8,9 @@
 //!                +------------------------ motion (estimate: odometer) ---------+
 //! ```
 //!
-//! The programs in `src/bin` join these to ports and devices.
+//! [`programs`] joins these to ports and devices; the executables in `src/bin` only run them.
 
 pub mod control;
 pub mod estimate;
+pub mod programs;
 pub mod vision;

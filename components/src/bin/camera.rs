@@ -1,2 +1,9 @@
-//! Stub.
-fn main() {}
+//! Takes flat pictures: see `components/camera/README.md`.
+
+use std::process::ExitCode;
+
+use sdr_components::programs::{Eye, PerspectiveCamera};
+
+fn main() -> ExitCode {
+    sdr_component::run::<Eye<PerspectiveCamera>>()
+}

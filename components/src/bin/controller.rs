@@ -1,2 +1,9 @@
-//! Stub.
-fn main() {}
+//! Drives and stops: see `components/controller/README.md`.
+
+use std::process::ExitCode;
+
+use sdr_components::programs::MotionController;
+
+fn main() -> ExitCode {
+    sdr_component::run::<MotionController>()
+}

@@ -51,10 +51,10 @@ impl Ticker {
     /// A tick begins.
     pub(super) fn begin(&mut self, now_ns: u64, is_error: bool) {
         let period_ns = match (self.period_ns, is_error) {
-            (Some(period), false) => period,
-            (Some(period), true) => period.max(ERROR_PERIOD_NS),
-            (None, true) => ERROR_PERIOD_NS,
-            (None, false) => 0,
+            (Some(period), false) => Some(period),
+            (Some(period), true) => Some(period.max(ERROR_PERIOD_NS)),
+            (None, true) => Some(ERROR_PERIOD_NS),
+            (None, false) => None,
         };
         if let Some(last) = self.last_ns {
             let period = now_ns.saturating_sub(last);
@@ -62,7 +62,7 @@ impl Ticker {
         }
         self.last_ns = Some(now_ns);
         self.beat.ticks += 1;
-        if period_ns > 0 {
+        if let Some(period_ns) = period_ns {
             let behind = now_ns.saturating_sub(self.next_ns);
             let skipped = behind / period_ns;
             if !is_error {

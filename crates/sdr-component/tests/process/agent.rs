@@ -23,23 +23,23 @@ use sdr_core::{
 /// Longest wait for anything; only a hang reaches it.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-pub fn key() -> ComponentKey {
+pub(crate) fn key() -> ComponentKey {
     ComponentKey::new(&Name::new("test").unwrap(), &Name::new("doubler").unwrap())
 }
 
-pub fn token(number: u64, run: u32) -> Token {
+pub(crate) fn token(number: u64, run: u32) -> Token {
     Token { epoch: Epoch { number, minted_by: RobotId::new("robot-1").unwrap() }, run }
 }
 
 /// One robot: a folder, a socket, a place in shared memory.
-pub struct Agent {
+pub(crate) struct Agent {
     folder: tempfile::TempDir,
     listener: UnixListener,
-    pub memory: SharedMemory,
+    pub(crate) memory: SharedMemory,
 }
 
 impl Agent {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let folder = tempfile::tempdir_in("/dev/shm").unwrap();
         let word = folder.path().file_name().unwrap().to_str().unwrap().replace(".tmp", "");
         let listener = UnixListener::bind(folder.path().join("s")).unwrap();
@@ -52,7 +52,7 @@ impl Agent {
     }
 
     /// Starts the component that this very test executable holds.
-    pub fn start(&self, orphan_ms: Option<u64>) -> Process {
+    pub(crate) fn start(&self, orphan_ms: Option<u64>) -> Process {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command
             .args(["--exact", "the_component_itself", "--nocapture", "--test-threads=1"])
@@ -66,7 +66,7 @@ impl Agent {
     }
 
     /// The next connection, and its greeting.
-    pub fn greet(&self) -> (Line, Hello) {
+    pub(crate) fn greet(&self) -> (Line, Hello) {
         let (stream, _) = self.listener.accept().unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let mut line = Line { stream, buffer: LineBuffer::default() };
@@ -77,7 +77,11 @@ impl Agent {
     }
 
     /// Starts a component and brings it to Inactive.
-    pub fn prepare(&self, orphan_ms: Option<u64>, execution: ExecutionSetup) -> (Process, Line) {
+    pub(crate) fn prepare(
+        &self,
+        orphan_ms: Option<u64>,
+        execution: ExecutionSetup,
+    ) -> (Process, Line) {
         let process = self.start(orphan_ms);
         let (mut line, _) = self.greet();
         line.say(&ToComponent::Configure(Box::new(self.configure(execution))));
@@ -85,7 +89,7 @@ impl Agent {
         (process, line)
     }
 
-    pub fn configure(&self, execution: ExecutionSetup) -> Configure {
+    pub(crate) fn configure(&self, execution: ExecutionSetup) -> Configure {
         Configure {
             v: PROTOCOL_VERSION,
             component: key(),
@@ -119,14 +123,14 @@ impl Drop for Agent {
 }
 
 /// A started component; killed when dropped.
-pub struct Process(Child);
+pub(crate) struct Process(Child);
 
 impl Process {
-    pub fn wait(mut self) -> ExitStatus {
+    pub(crate) fn wait(mut self) -> ExitStatus {
         self.0.wait().unwrap()
     }
 
-    pub fn id(&self) -> u32 {
+    pub(crate) fn id(&self) -> u32 {
         self.0.id()
     }
 }
@@ -139,31 +143,31 @@ impl Drop for Process {
 }
 
 /// A connection to a component.
-pub struct Line {
+pub(crate) struct Line {
     stream: UnixStream,
     buffer: LineBuffer,
 }
 
 impl Line {
-    pub fn say(&mut self, message: &ToComponent) {
+    pub(crate) fn say(&mut self, message: &ToComponent) {
         self.say_bytes(&encode_line(message).unwrap());
     }
 
-    pub fn order(&mut self, order: Order) {
+    pub(crate) fn order(&mut self, order: Order) {
         self.say(&ToComponent::Command(order));
     }
 
-    pub fn say_bytes(&mut self, bytes: &[u8]) {
+    pub(crate) fn say_bytes(&mut self, bytes: &[u8]) {
         self.stream.write_all(bytes).unwrap();
     }
 
     /// The next word; panics when the component hung up.
-    pub fn next(&mut self) -> FromComponent {
+    pub(crate) fn next(&mut self) -> FromComponent {
         self.try_next().expect("the component hung up")
     }
 
     /// The next word, or `None` when the component hung up.
-    pub fn try_next(&mut self) -> Option<FromComponent> {
+    pub(crate) fn try_next(&mut self) -> Option<FromComponent> {
         let mut chunk = [0; 4096];
         loop {
             if let Some(word) = self.buffer.next_message().unwrap() {
@@ -177,7 +181,7 @@ impl Line {
     }
 
     /// Reads until a word is what is wanted.
-    pub fn until<T>(&mut self, mut wanted: impl FnMut(FromComponent) -> Option<T>) -> T {
+    pub(crate) fn until<T>(&mut self, mut wanted: impl FnMut(FromComponent) -> Option<T>) -> T {
         loop {
             if let Some(found) = wanted(self.next()) {
                 return found;
@@ -185,14 +189,14 @@ impl Line {
         }
     }
 
-    pub fn until_state(&mut self, state: LifecycleState) -> StateReport {
+    pub(crate) fn until_state(&mut self, state: LifecycleState) -> StateReport {
         self.until(|word| match word {
             FromComponent::State(report) if report.state == state => Some(report),
             _ => None,
         })
     }
 
-    pub fn until_error(&mut self) -> String {
+    pub(crate) fn until_error(&mut self) -> String {
         self.until(|word| match word {
             FromComponent::Error(error) => Some(error.message),
             _ => None,
