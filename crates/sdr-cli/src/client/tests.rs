@@ -46,10 +46,11 @@ impl Canned {
     }
 
     async fn refusal(&self) -> String {
-        match Failure::from(self.client().get::<StatusView>("/v1/status").await.unwrap_err()) {
-            Failure::Failed(answer) => answer.error,
-            other => panic!("{other:?}"),
-        }
+        let error = self.client().get::<StatusView>("/v1/status").await.unwrap_err();
+        let Failure::Failed(answer) = Failure::from(error) else {
+            panic!("failed, not wrong usage")
+        };
+        answer.error
     }
 }
 
@@ -75,13 +76,10 @@ async fn a_request_carries_its_body() {
 async fn a_refusal_keeps_the_agents_words_and_details() {
     let body = r#"{"error":"no such system","details":{"known":"a, b"}}"#;
     let server = Canned::http("404 Not Found", body);
-    match server.client().delete("/v1/systems/c").await.unwrap_err() {
-        ClientError::Refused { status, answer } => {
-            assert_eq!((status, answer.error.as_str()), (404, "no such system"));
-            assert_eq!(answer.details["known"], "a, b");
-        }
-        other => panic!("{other:?}"),
-    }
+    let error = server.client().delete("/v1/systems/c").await.unwrap_err();
+    let ClientError::Refused { status, answer } = error else { panic!("{error:?}") };
+    assert_eq!((status, answer.error.as_str()), (404, "no such system"));
+    assert_eq!(answer.details["known"], "a, b");
 }
 
 #[tokio::test]

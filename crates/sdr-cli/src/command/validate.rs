@@ -17,6 +17,10 @@ use crate::{
     Session, client::Client, failure::Failure, locate, output::Format, render::units::count,
 };
 
+/// What to do about ports that were not checked.
+const WHERE_PROFILES_ARE: &str = "  Name their folder: --components DIR, or a running agent: --agent SOCKET, \
+    or build the paper's:\n    cargo build --release -p sdr-components";
+
 /// Arguments of `sdr validate`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct ValidateArgs {
@@ -116,7 +120,10 @@ fn tell(reports: &[FileReport], session: &Session) -> Result<ExitCode, Failure> 
                     report.kind.word()
                 ))?;
                 for reason in &report.unchecked {
-                    session.output.line(&format!("  not checked: {reason}"))?;
+                    session.output.line(&format!("  ports not checked: {reason}"))?;
+                }
+                if !report.unchecked.is_empty() {
+                    session.output.line(WHERE_PROFILES_ARE)?;
                 }
             }
         }

@@ -1,4 +1,5 @@
 //! The built `sdr` against an agent with canned answers: exit codes, stdout, stderr.
+#![cfg(test)]
 
 mod agent;
 mod sdr;
