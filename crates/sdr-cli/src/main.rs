@@ -39,7 +39,7 @@ pub(crate) struct Session {
 
 /// Runs components of one system on a team of robots.
 #[derive(Debug, Parser)]
-#[command(name = "sdr", version, about, max_term_width = 80)]
+#[command(name = "sdr", version, max_term_width = 80)]
 struct Cli {
     /// Unix socket of the agent to ask [default: /run/sdr/agent.sock]
     #[arg(long, global = true, env = "SDR_AGENT", value_name = "ADDRESS", hide_env_values = true)]

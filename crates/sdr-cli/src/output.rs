@@ -13,13 +13,11 @@ use crate::failure::Failure;
 /// Width when stdout is no terminal.
 pub(crate) const COLUMNS: usize = 80;
 
-/// The form of answers.
+/// The form of answers: text for people, or JSON alone on stdout for programs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
-    /// For people.
     #[default]
     Text,
-    /// For programs: stdout holds JSON and nothing else.
     Json,
 }
 

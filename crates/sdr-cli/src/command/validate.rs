@@ -18,8 +18,9 @@ use crate::{
 };
 
 /// What to do about ports that were not checked.
-const WHERE_PROFILES_ARE: &str = "  Name their folder: --components DIR, or a running agent: --agent SOCKET, \
-    or build the paper's:\n    cargo build --release -p sdr-components";
+const WHERE_PROFILES_ARE: &str = "\
+  name their folder (--components DIR) or an agent (--agent SOCKET), or build the paper's:
+    cargo build --release -p sdr-components";
 
 /// Arguments of `sdr validate`.
 #[derive(Debug, clap::Args)]
@@ -39,13 +40,9 @@ pub(crate) struct ValidateArgs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Kind {
-    /// Components, connections and policies
     System,
-    /// One robot's configuration
     Robot,
-    /// How components are placed
     Allocation,
-    /// What is done in trouble
     Recovery,
 }
 
@@ -123,7 +120,7 @@ fn tell(reports: &[FileReport], session: &Session) -> Result<ExitCode, Failure> 
                     session.output.line(&format!("  ports not checked: {reason}"))?;
                 }
                 if !report.unchecked.is_empty() {
-                    session.output.line(WHERE_PROFILES_ARE)?;
+                    session.output.line(&format!("  {WHERE_PROFILES_ARE}"))?;
                 }
             }
         }
