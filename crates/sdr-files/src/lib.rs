@@ -10,8 +10,17 @@
 //! Every problem has file, line and column, says what was found and what is allowed, and
 //! as many as possible are told at once. The types that the files are read into are also
 //! the source of the JSON schemas ([`schema`]).
+//!
+//! ```
+//! let text = "system: s\ncomponents:\n  eye: { run: { native: camera }, rat: 15Hz }\n";
+//! let problems = sdr_files::parse_system("s.yaml", text, ".".as_ref()).unwrap_err();
+//! let first = problems.to_string();
+//! assert!(first.starts_with("s.yaml:3:35: unknown key `rat`; allowed: run, needs, rate"));
+//! assert!(first.contains("(did you mean `rate`?)"));
+//! ```
 #![forbid(unsafe_code)]
 
+mod kind;
 mod near;
 mod policy;
 pub mod problem;
@@ -20,8 +29,10 @@ mod tree;
 pub mod units;
 
 pub mod robot;
+pub mod schema;
 mod system;
 
+pub use kind::{FileKind, LoadedFile, detect, load_any};
 pub use policy::{load_allocation, load_recovery};
 pub use problem::{Problem, Problems};
 pub use robot::{RobotConfig, load_robot};

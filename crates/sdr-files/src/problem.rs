@@ -35,16 +35,33 @@ impl fmt::Display for Problem {
         if self.line == 0 {
             return Ok(());
         }
+        let (shown, column) = self.window();
         let number = self.line.to_string();
         let margin = " ".repeat(number.len());
-        let before: String = self
-            .snippet
+        let before: String = shown
             .chars()
-            .take(self.column.saturating_sub(1) as usize)
+            .take(column)
             .map(|character| if character == '\t' { '\t' } else { ' ' })
             .collect();
-        let carets = "^".repeat(self.width.max(1) as usize);
-        write!(f, "\n  {number} | {}\n  {margin} | {before}{carets}", self.snippet)
+        let room = shown.chars().count().saturating_sub(column).max(1);
+        let carets = "^".repeat((self.width as usize).clamp(1, room));
+        write!(f, "\n  {number} | {shown}\n  {margin} | {before}{carets}")
+    }
+}
+
+/// Longest part of a line that is shown, in characters.
+const SHOWN_MAX: usize = 160;
+
+impl Problem {
+    /// The part of the line around the column, and the column's place in it, from 0.
+    fn window(&self) -> (String, usize) {
+        let column = self.column.saturating_sub(1) as usize;
+        if self.snippet.chars().count() <= SHOWN_MAX {
+            return (self.snippet.clone(), column);
+        }
+        let start = column.saturating_sub(SHOWN_MAX / 2);
+        let part = self.snippet.chars().skip(start).take(SHOWN_MAX).collect();
+        (part, column - start)
     }
 }
 

@@ -168,4 +168,3 @@ pub(crate) enum UnknownElse {
 crate::read::choices! {
     UnknownElse { "refuse" => Self::Refuse, "worst" => Self::Worst, }
 }
-

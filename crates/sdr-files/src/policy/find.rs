@@ -147,11 +147,10 @@ impl Finder {
         }
         let built_in: Vec<&str> = F::BUILT_IN.iter().map(|(name, _)| *name).collect();
         let message = format!("unknown {} policy `{name}`", F::KIND);
-        let places: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
         let help = format!(
-            "{} (built in), or a file {}",
-            allowed_words(name, &built_in),
-            places.join(" or ")
+            "built in are {}; others stand in policies/{}/{name}.yaml, here or one folder above",
+            allowed_words(name, &built_in).trim_start_matches("allowed: "),
+            F::KIND,
         );
         reader.problem(word.mark, message, Some(help));
         None
@@ -186,15 +185,11 @@ impl Finder {
 }
 
 /// Reads and checks the policy in `source`.
-pub(super) fn load<F: PolicyFile>(
-    source: Source,
-    finder: &Finder,
-) -> Result<F::Policy, Problems> {
+pub(super) fn load<F: PolicyFile>(source: Source, finder: &Finder) -> Result<F::Policy, Problems> {
     let mut reader = Reader::new(source.clone());
     let tree = parse_yaml(&source).map_err(Problems::of)?;
-    let policy = F::read(&tree, &mut reader).and_then(|file| {
-        file.checked(Finding { tree: &tree, finder, name: None }, &mut reader)
-    });
+    let policy = F::read(&tree, &mut reader)
+        .and_then(|file| file.checked(Finding { tree: &tree, finder, name: None }, &mut reader));
     reader.finish(policy)
 }
 

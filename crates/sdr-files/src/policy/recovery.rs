@@ -47,7 +47,8 @@ impl PolicyFile for RecoveryFile {
             None => {}
             Some(At { value: RulesEntry::Only, mark }) => {
                 if changed.is_empty() {
-                    let message = "`rules: only` keeps the rules under `override`, and none is there";
+                    let message =
+                        "`rules: only` keeps the rules under `override`, and none is there";
                     reader.problem(mark, message, None);
                 }
                 parts.rules.retain(|rule| changed.contains(&rule.cause));
@@ -69,11 +70,7 @@ impl PolicyFile for RecoveryFile {
     }
 }
 
-fn ladders(
-    given: Option<Map<At<Vec<Rung>>>>,
-    parts: &mut PolicyParts,
-    reader: &mut Reader,
-) {
+fn ladders(given: Option<Map<At<Vec<Rung>>>>, parts: &mut PolicyParts, reader: &mut Reader) {
     for (name, rungs) in given.map(|ladders| ladders.0).unwrap_or_default() {
         let Some(rungs) = rungs else { continue };
         match Ladder::new(rungs.value) {

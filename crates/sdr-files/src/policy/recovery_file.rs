@@ -298,4 +298,3 @@ choices! {
     UnknownFact { "ignore" => Self, }
     Return { "never" => Self::Never, }
 }
-

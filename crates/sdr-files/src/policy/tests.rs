@@ -30,8 +30,7 @@ fn the_exploration_files_say_tables_v_and_vi() {
     assert!(!placing.strict.judge_links());
     assert_eq!(placing.relaxed.unwrap().memory_free_at_least.unwrap().0, 250_000_000);
 
-    let mending =
-        recovery(include_str!("../../../../policies/recovery/exploration.yaml")).unwrap();
+    let mending = recovery(include_str!("../../../../policies/recovery/exploration.yaml")).unwrap();
     let rules = &mending.parts().rules;
     let rssi = rules.iter().find(|rule| rule.cause.word() == "rssi-low").unwrap();
     let Trigger::Condition(rssi) = rssi.trigger else { panic!("{rssi:?}") };

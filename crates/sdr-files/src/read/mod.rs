@@ -8,7 +8,7 @@ use std::net::SocketAddr;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 pub(crate) use table::{Keys, choices, table};
-pub(crate) use values::{At, Map, quantity};
+pub(crate) use values::{At, Map, Need, quantity};
 
 use crate::{
     near::allowed_words,

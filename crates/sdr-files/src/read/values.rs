@@ -53,6 +53,35 @@ impl<T: Read> JsonSchema for At<T> {
     }
 }
 
+/// A key that must be there, but whose value may have been told as a problem: the rest of
+/// the table is still judged.
+#[derive(Clone, Debug)]
+pub(crate) struct Need<T>(pub(crate) Option<T>);
+
+impl<T: Read> Read for Need<T> {
+    fn read(node: &Node, reader: &mut Reader) -> Option<Self> {
+        Some(Self(T::read(node, reader)))
+    }
+
+    fn schema(generator: &mut SchemaGenerator) -> Schema {
+        T::schema(generator)
+    }
+}
+
+impl<T: Read> JsonSchema for Need<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        Cow::Borrowed("Need")
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        T::schema(generator)
+    }
+}
+
 /// A key that may be missing. A value that cannot be read is told and then counts as
 /// missing, so that the rest of the file is still judged.
 impl<T: Read> Read for Option<T> {

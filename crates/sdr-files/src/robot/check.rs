@@ -16,8 +16,8 @@ use super::{
         RosConfig, SensorsConfig, StorageConfig, SystemPort,
     },
     file::{
-        CapacityTable, Devices, LogTable, MeshTable, RadioTable, RecordingsEntry, RobotFile,
-        RobotTable, SensorsTable, StorageTable,
+        CapacityTable, ComponentsTable, Devices, LogTable, MeshTable, RadioTable, RecordingsEntry,
+        RobotFile, RobotTable, SensorsTable, StorageTable,
     },
     places::Places,
     sources::{BatterySource, PositionSource, RssiEntry, RssiSource, SensorEntry},
@@ -38,35 +38,44 @@ pub(super) fn checked(
     places: &Places,
     reader: &mut Reader,
 ) -> Option<RobotConfig> {
-    let mesh = mesh(file.mesh, reader);
     let (name, labels, devices) = body(file.robot, places, reader);
-    let ros = file.ros.and_then(|table| table.domain_id);
-    let components = file.components;
-    let on_agent_death = components.as_ref().and_then(|table| table.on_agent_death.as_ref());
+    let mesh = mesh(file.mesh, reader);
+    let capacity = capacity(file.capacity, reader);
+    let radio = radio(file.radio, places, reader);
+    let sensors = file.sensors.map(|table| sensors(table, places, reader)).unwrap_or_default();
+    let domain_id = file.ros.and_then(|table| table.domain_id);
+    let ros =
+        RosConfig { domain_id: domain_id.map_or(0, |domain| self::domain_id(&domain, reader)) };
     let preference = file.coordinator.and_then(|table| table.preference);
     let socket = file.api.and_then(|table| table.socket);
+    let storage = storage(file.storage, places, reader);
+    let log = log(file.log, reader);
     let config = RobotConfig {
         name: name?,
         labels,
         devices,
-        capacity: capacity(file.capacity, reader),
+        capacity,
         mesh: mesh?,
-        radio: radio(file.radio, places, reader),
-        sensors: file.sensors.map(|table| sensors(table, places, reader)).unwrap_or_default(),
-        ros: RosConfig { domain_id: ros.map_or(0, |domain| domain_id(&domain, reader)) },
+        radio,
+        sensors,
+        components: components(file.components, places),
+        ros,
         coordinator: preference.map_or(RolePreference::Able, |preference| preference.value),
-        components: ComponentsConfig {
-            on_agent_death: on_agent_death.map_or(OnAgentDeath::Keep, |at| at.value),
-            path: components
-                .and_then(|table| table.path)
-                .map(|paths| paths.value.iter().map(|p| places.resolve(&p.value)).collect())
-                .unwrap_or_default(),
-        },
         api: ApiConfig { socket: path_or(socket, places, || places.run.join("agent.sock")) },
-        storage: storage(file.storage, places, reader),
-        log: log(file.log, reader),
+        storage,
+        log,
     };
     reader.is_clean().then_some(config)
+}
+
+fn components(table: Option<ComponentsTable>, places: &Places) -> ComponentsConfig {
+    let (path, on_agent_death) =
+        table.map_or((None, None), |table| (table.path, table.on_agent_death));
+    let path = path.map(|path| path.value).unwrap_or_default();
+    ComponentsConfig {
+        path: path.iter().map(|at| places.resolve(&at.value)).collect(),
+        on_agent_death: on_agent_death.map_or(OnAgentDeath::Keep, |at| at.value),
+    }
 }
 
 fn path_or(
@@ -142,18 +151,9 @@ fn capacity(table: Option<CapacityTable>, reader: &mut Reader) -> CapacityConfig
     }
 }
 
-fn mesh(table: MeshTable, reader: &mut Reader) -> Option<MeshConfig> {
-    let unsealed = table.unsealed.as_ref().is_some_and(|unsealed| unsealed.value);
-    if !unsealed {
-        let mark = match (&table.keys, &table.unsealed) {
-            (Some(keys), _) => keys.mark,
-            (None, Some(flag)) => flag.mark,
-            (None, None) => Mark::FILE,
-        };
-        let help = "allowed for now: `unsealed = true`, on loopback addresses only";
-        let message = "a sealed mesh (with keys) is not in this version";
-        reader.problem(mark, message, Some(help.to_owned()));
-    }
+fn mesh(table: At<MeshTable>, reader: &mut Reader) -> Option<MeshConfig> {
+    let At { value: table, mark } = table;
+    let unsealed = check_seal(&table, mark, reader);
     let listen = match table.listen {
         Some(listen) => loopback(&listen, reader),
         None => Some(SocketAddr::from(([127, 0, 0, 1], MESH_PORT))),
@@ -181,6 +181,23 @@ fn mesh(table: MeshTable, reader: &mut Reader) -> Option<MeshConfig> {
         gone_after,
         rejoin_wait,
     })
+}
+
+/// Whether datagrams are plain, which this version needs to be told.
+fn check_seal(table: &MeshTable, mark: Mark, reader: &mut Reader) -> bool {
+    let (unsealed, mark) = match (&table.unsealed, &table.keys) {
+        (Some(flag), keys) => (flag.value, keys.as_ref().map_or(flag.mark, |keys| keys.mark)),
+        (None, Some(keys)) => (false, keys.mark),
+        // The word behind `unsealed` was told before.
+        (None, None) if !reader.is_clean() => return false,
+        (None, None) => (false, mark),
+    };
+    if !unsealed {
+        let help = "allowed for now: `unsealed = true`, on loopback addresses only";
+        let message = "a sealed mesh (with keys) is not in this version";
+        reader.problem(mark, message, Some(help.to_owned()));
+    }
+    unsealed
 }
 
 /// An address on loopback, where alone plain datagrams are allowed.

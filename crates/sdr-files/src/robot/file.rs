@@ -26,7 +26,7 @@ table! {
         /// What components may use.
         capacity: Option<CapacityTable>,
         /// How it meets the others.
-        mesh: MeshTable,
+        mesh: At<MeshTable>,
         /// Its radio.
         radio: Option<RadioTable>,
         /// Where figures of the body come from; leave out what the robot lacks.

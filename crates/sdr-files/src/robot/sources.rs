@@ -97,6 +97,12 @@ pub(crate) struct BatteryEntry(pub(crate) SensorEntry);
 pub(crate) struct PositionEntry(pub(crate) SensorEntry);
 
 fn sensor(node: &Node, reader: &mut Reader, words: &[&str]) -> Option<SensorEntry> {
+    if let Body::Table(entries) = &node.body
+        && let Some((key, _)) = entries.iter().find(|(key, _)| key.word == "ros")
+    {
+        reader.later(key.mark, "ros", "a figure from a ROS 2 topic");
+        return None;
+    }
     let allowed = words.iter().map(|word| format!("{{ {word} = \"...\" }}")).collect::<Vec<_>>();
     let (key, value) = single(node, reader, &allowed.join(", "))?;
     match key.word.as_str() {
@@ -105,10 +111,6 @@ fn sensor(node: &Node, reader: &mut Reader, words: &[&str]) -> Option<SensorEntr
         }
         "file" => String::read(value, reader).map(SensorEntry::File),
         "port" => At::read(value, reader).map(SensorEntry::Port),
-        "ros" => {
-            reader.later(key.mark, "ros", "a figure from a ROS 2 topic");
-            None
-        }
         "snmp" => {
             reader.later(key.mark, "snmp", "a figure from an SNMP device");
             None

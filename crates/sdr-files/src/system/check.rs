@@ -44,16 +44,17 @@ pub(super) fn checked(
     finder: &Finder,
     reader: &mut Reader,
 ) -> Option<LoadedSystem> {
+    let system = file.system.0;
     let (allocation, recovery) =
-        policies(file.allocation, file.recovery, (finder, &file.system), reader);
-    let entries = file.components.value.0;
+        policies(file.allocation, file.recovery, (finder, system.as_ref()), reader);
+    let At { value: Map(entries), mark } = file.components.0?;
     if entries.is_empty() {
-        reader.problem(file.components.mark, "a system has at least one component", None);
+        reader.problem(mark, "a system has at least one component", None);
     }
     if entries.len() > PARTS_MAX {
         let message = format!("{} components", entries.len());
         let help = format!("allowed: at most {PARTS_MAX}");
-        reader.problem(file.components.mark, message, Some(help));
+        reader.problem(mark, message, Some(help));
         return None;
     }
     let names: Vec<&str> = entries.iter().map(|(name, _)| name.value.as_str()).collect();
@@ -61,8 +62,7 @@ pub(super) fn checked(
     check_start_order(&entries, reader);
     let connections = connections(file.connections, &names, reader);
     let defaults = Defaults::of(file.defaults, reader);
-    let mut places =
-        SystemPlaces { source, components: Vec::new(), connections: connections.1 };
+    let mut places = SystemPlaces { source, components: Vec::new(), connections: connections.1 };
     let mut components = Vec::new();
     for (name, table) in entries {
         let made = component(name, table, &defaults, reader);
@@ -72,8 +72,9 @@ pub(super) fn checked(
         components.push(component);
         places.components.push(place);
     }
+    let system = system?;
     let spec = SystemSpec {
-        name: file.system.value,
+        name: system.value,
         components,
         connections: connections.0,
         allocation,
@@ -83,7 +84,7 @@ pub(super) fn checked(
         return None;
     }
     if let Err(error) = spec.check() {
-        reader.problem(file.system.mark, error.to_string(), None);
+        reader.problem(system.mark, error.to_string(), None);
     }
     Some(LoadedSystem { spec, places })
 }
@@ -93,12 +94,12 @@ type Named<F> = Option<At<PolicyEntry<F>>>;
 fn policies(
     allocation: Named<AllocationFile>,
     recovery: Named<RecoveryFile>,
-    (finder, system): (&Finder, &At<Name>),
+    (finder, system): (&Finder, Option<&At<Name>>),
     reader: &mut Reader,
 ) -> (PolicyBytes, PolicyBytes) {
-    let name = system.value.as_str();
-    let mark = allocation.as_ref().map_or(system.mark, |entry| entry.mark);
-    let recovery_mark = recovery.as_ref().map_or(system.mark, |entry| entry.mark);
+    let (name, own) = system.map_or(("system", Mark::FILE), |at| (at.value.as_str(), at.mark));
+    let mark = allocation.as_ref().map_or(own, |entry| entry.mark);
+    let recovery_mark = recovery.as_ref().map_or(own, |entry| entry.mark);
     let allocation = match allocation {
         Some(entry) => finder.entry(entry, name, reader),
         None => Some(AllocationFile::standard()),
@@ -127,8 +128,9 @@ fn check_bars(
     let fault = recovery.parts().rules.iter().find_map(|rule| match rule.trigger {
         Trigger::Condition(condition) => match condition.bar {
             Bar::AtMost(Level::Memory(bytes)) => Some(bytes),
-            Bar::AtMost(Level::Share(_) | Level::Signal(_) | Level::Time(_))
-            | Bar::AtLeast(_) => None,
+            Bar::AtMost(Level::Share(_) | Level::Signal(_) | Level::Time(_)) | Bar::AtLeast(_) => {
+                None
+            }
         },
         Trigger::Fault => None,
     });
@@ -270,7 +272,7 @@ fn component(
         given.map(|list| list.value.into_iter().map(|at| at.value).collect()).unwrap_or_default()
     };
     let place = table.place.map(|place| self::place(place, list)).unwrap_or_default();
-    let run = table.run;
+    let run = table.run.0?;
     let launch =
         Launch::Native { executable: run.value.executable, arguments: run.value.arguments };
     let name = checked_name?;

@@ -11,7 +11,7 @@ use sdr_core::{
 
 use crate::{
     policy::{AllocationFile, PolicyEntry, RecoveryFile},
-    read::{At, Map, Read, Reader, choices, one_key, quantity, table},
+    read::{At, Map, Need, Read, Reader, choices, one_key, quantity, table},
     tree::{Body, Node},
     units,
 };
@@ -20,7 +20,7 @@ table! {
     /// A system: components, what connects them, and the policies that place and mend them.
     pub(crate) struct SystemFile {
         /// Its name; one system of that name runs in a fleet.
-        system: At<Name>,
+        system: Need<At<Name>>,
         /// How to place: the name of a policy, a path, or the policy itself; default `default`.
         allocation: Option<At<PolicyEntry<AllocationFile>>>,
         /// What to do in trouble: as `allocation`.
@@ -28,7 +28,7 @@ table! {
         /// For components that do not say otherwise.
         defaults: Option<DefaultsTable>,
         /// Components by name; first-fit takes them in this order.
-        components: At<Map<At<ComponentTable>>>,
+        components: Need<At<Map<At<ComponentTable>>>>,
         /// Which output feeds which input: `a.out -> b.in`, or the long form.
         connections: Option<At<Vec<ConnectionEntry>>>,
     }
@@ -61,7 +61,7 @@ table! {
     /// One component.
     pub(crate) struct ComponentTable {
         /// How its process is started.
-        run: At<RunEntry>,
+        run: Need<At<RunEntry>>,
         /// What it is said to need.
         needs: Option<NeedsTable>,
         /// How often it is called.

@@ -29,7 +29,8 @@ pub fn link_profiles(
     }
     let components = &system.spec.components;
     for (connection, marks) in system.spec.connections.iter_mut().zip(&system.places.connections) {
-        let from = port(&connection.from, End::Output, (components, profiles), (marks.0, &mut reader));
+        let from =
+            port(&connection.from, End::Output, (components, profiles), (marks.0, &mut reader));
         let to = port(&connection.to, End::Input, (components, profiles), (marks.1, &mut reader));
         let (Some(from), Some(to)) = (from, to) else { continue };
         if from.message_type != to.message_type {
@@ -87,7 +88,11 @@ fn link_parameters(
             *value = Value::Float(number);
         }
         if value.kind() != parameter.default.kind() {
-            let message = format!("parameter `{name}` is {}, found {}", parameter.default.kind(), value.kind());
+            let message = format!(
+                "parameter `{name}` is {}, found {}",
+                parameter.default.kind(),
+                value.kind()
+            );
             let help = format!("allowed: such as {}, its default", parameter.default);
             reader.problem(marks.1, message, Some(help));
         }

@@ -177,6 +177,10 @@ fn mark_of(source: &Source, at: &Location) -> Mark {
 /// The reader's own words without its place, which stands before ours.
 fn plain_message(error: &serde_yaml::Error) -> String {
     let text = error.without_snippet().to_string();
+    if let Some(which) = text.split("budget breached:").nth(1) {
+        let which = which.split('{').next().unwrap_or(which).trim().to_lowercase();
+        return format!("too much for one file ({which}); aliases and nesting count each time");
+    }
     let first = text.lines().next().unwrap_or("not YAML").trim();
     let head = first.split(" at line ").next().unwrap_or(first);
     head.trim_end_matches(['.', ',', ' ']).to_owned()
