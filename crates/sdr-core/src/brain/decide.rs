@@ -178,9 +178,7 @@ impl Brain {
     fn adopt(&mut self, now: Instant, asked: &Asked, plan: &Plan) {
         for homeless in &plan.homeless {
             let refusals: Vec<String> = homeless.refusals.iter().map(ToString::to_string).collect();
-            let known =
-                self.plans.refusals.insert(homeless.component.clone(), homeless.refusals.clone());
-            if known.as_ref() != Some(&homeless.refusals) {
+            if self.say_homeless(homeless) {
                 self.event_about("homeless", &homeless.component, refusals.join("; "));
             }
         }

@@ -99,7 +99,7 @@ impl Brain {
         let refusals = self.refusals_of(&key);
         let why = wanted.map(|(_, assignment)| assignment.reason.clone());
         let held = self.held.get(&key).map(|held| format!("held: {held}"));
-        let call = self.call_of(&key);
+        let call = self.is_given_up(&key).then(|| self.call_of(&key)).flatten();
         ComponentView {
             name: spec.name.to_string(),
             home: home.map(|home| home.to_string()),
