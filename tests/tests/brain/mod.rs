@@ -1,0 +1,5 @@
+//! Brains of two and three robots in virtual time.
+
+mod deployment;
+mod recovery;
+mod role;

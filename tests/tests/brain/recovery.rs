@@ -1,0 +1,186 @@
+//! Trouble: crashes, hangs, fading radio, vanished robots.
+
+use std::time::Duration;
+
+use sdr_core::recover::Cause;
+use sdr_tests::{
+    fleet::{Behaviour, Fleet},
+    systems::{exploration, single},
+};
+
+const LONG: Duration = Duration::from_secs(30);
+
+fn deployed(seed: u64) -> Fleet {
+    let mut fleet = Fleet::new(3, seed);
+    (0..3).for_each(|number| fleet.set_rssi(number, -47.0));
+    fleet.run(Duration::from_secs(2));
+    fleet.deploy(0, &exploration());
+    fleet.run_until(LONG, "all active", |fleet| fleet.is_running("exploration"));
+    fleet.run(Duration::from_secs(2));
+    fleet
+}
+
+#[test]
+fn a_fading_radio_moves_both_components_together_to_the_relaxed_home() {
+    let mut fleet = deployed(1);
+    fleet.set_rssi(0, -55.0);
+    let faded = fleet.now;
+    fleet.run_until(LONG, "moved", |fleet| {
+        fleet.home("exploration", "fisheye").as_deref() == Some("robot-3")
+            && fleet.is_running("exploration")
+    });
+
+    let (raised, _) = fleet.events("condition-raised")[0].clone();
+    assert!(raised.since(faded) >= Duration::from_secs(6), "{}", fleet.story());
+    assert_eq!(fleet.home("exploration", "anomaly").as_deref(), Some("robot-3"));
+    let fisheye = fleet.component("exploration", "fisheye").unwrap();
+    assert_eq!(fisheye.epoch, 2);
+    assert!(fisheye.reason.contains("310 MB left (relaxed tier)"), "{}", fisheye.reason);
+    for stays in ["camera", "controller", "position"] {
+        assert_eq!(fleet.component("exploration", stays).unwrap().epoch, 1);
+    }
+    fleet.run(Duration::from_secs(3));
+    assert_eq!(fleet.active_on("fisheye").len(), 1, "{}", fleet.story());
+    let launches: usize = fleet.robots.iter().map(|robot| robot.launches).sum();
+    assert_eq!(launches, 7, "{}", fleet.story());
+}
+
+#[test]
+fn the_old_home_goes_on_until_the_new_one_is_heard() {
+    let mut fleet = deployed(2);
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "old home drained", |fleet| fleet.events("drained").len() == 2);
+
+    let drained = fleet.events("drained")[0].0;
+    let heard = fleet
+        .events("heard")
+        .iter()
+        .filter(|(_, event)| event.token.as_ref().is_some_and(|token| token.epoch.number == 2))
+        .map(|(at, _)| *at)
+        .min()
+        .unwrap();
+    assert!(heard <= drained, "{}", fleet.story());
+}
+
+#[test]
+fn nothing_comes_back_by_itself_when_the_radio_is_fine_again() {
+    let mut fleet = deployed(3);
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "moved", |fleet| !fleet.events("moved").is_empty());
+    fleet.set_rssi(0, -47.0);
+    fleet.run(Duration::from_secs(60));
+
+    assert_eq!(fleet.home("exploration", "fisheye").as_deref(), Some("robot-3"));
+    assert_eq!(fleet.events("moved").len(), 2, "{}", fleet.story());
+}
+
+#[test]
+fn a_crash_is_restarted_at_home_under_the_same_epoch_and_a_greater_run() {
+    let mut fleet = deployed(4);
+    let now = fleet.now;
+    fleet.robots[1].kill(now, "camera");
+    fleet.run(Duration::from_millis(10));
+    fleet.run_until(LONG, "active again", |fleet| fleet.is_running("exploration"));
+
+    let camera = fleet.component("exploration", "camera").unwrap();
+    assert_eq!((camera.home.as_deref(), camera.epoch, camera.run), (Some("robot-2"), 1, 2));
+}
+
+#[test]
+fn a_hang_is_killed_and_restarted() {
+    let mut fleet = deployed(5);
+    let now = fleet.now;
+    fleet.robots[1].hang(now, "controller");
+    fleet.run(Duration::from_millis(10));
+    fleet.run_until(LONG, "active again", |fleet| fleet.is_running("exploration"));
+    assert_eq!(fleet.component("exploration", "controller").unwrap().run, 2);
+}
+
+#[test]
+fn a_crash_loop_climbs_from_restarts_to_another_robot() {
+    let mut fleet = Fleet::new(2, 6);
+    fleet.run(Duration::from_secs(2));
+    let crashing =
+        Behaviour { crash_after: Some(Duration::from_millis(200)), ..Behaviour::default() };
+    fleet.robots[0].behaviours.insert("worker".into(), crashing);
+    let mut system = single(100);
+    system.components[0].place.labels.clear();
+    fleet.deploy(0, &system);
+    let first = fleet.home("alone", "worker");
+    fleet.run_until(Duration::from_secs(60), "settled on robot-2", |fleet| {
+        fleet.home("alone", "worker").as_deref() == Some("robot-2") && fleet.is_running("alone")
+    });
+
+    if first.as_deref() == Some("robot-1") {
+        assert!(fleet.events("restart").len() >= 3, "{}", fleet.story());
+    }
+    fleet.run(Duration::from_secs(30));
+    assert!(fleet.is_running("alone"), "{}", fleet.story());
+}
+
+#[test]
+fn lost_hardware_leaves_the_robot_without_a_local_attempt() {
+    let mut fleet = Fleet::new(2, 7);
+    fleet.run(Duration::from_secs(2));
+    let failing = Behaviour {
+        fail_after: Some((Duration::from_millis(300), Cause::HardwareLost)),
+        ..Behaviour::default()
+    };
+    fleet.robots[0].behaviours.insert("worker".into(), failing.clone());
+    let mut system = single(100);
+    system.components[0].place.robot = None;
+    fleet.deploy(0, &system);
+    fleet.run_until(LONG, "runs on robot-2", |fleet| {
+        fleet.home("alone", "worker").as_deref() == Some("robot-2") && fleet.is_running("alone")
+    });
+    assert!(fleet.events("restart").is_empty(), "{}", fleet.story());
+}
+
+#[test]
+fn components_of_a_vanished_robot_find_new_homes() {
+    let mut fleet = deployed(8);
+    fleet.switch_off(2);
+    fleet.run_until(LONG, "position elsewhere", |fleet| {
+        fleet.home("exploration", "position").is_some_and(|home| home != "robot-3")
+            && fleet.is_running("exploration")
+    });
+    let position = fleet.component("exploration", "position").unwrap();
+    assert_eq!(position.epoch, 2);
+
+    fleet.switch_on(2);
+    fleet.run(Duration::from_secs(10));
+    assert_eq!(fleet.active_on("position").len(), 1, "{}", fleet.story());
+    assert!(fleet.is_running("exploration"));
+}
+
+#[test]
+fn a_restarted_agent_brings_its_own_components_back_alone() {
+    let mut fleet = Fleet::new(1, 9);
+    fleet.run(Duration::from_secs(3));
+    fleet.deploy(0, &single(100));
+    fleet.run_until(LONG, "active", |fleet| fleet.is_running("alone"));
+    fleet.switch_off(0);
+    fleet.run(Duration::from_secs(5));
+    fleet.switch_on(0);
+    fleet.run_until(LONG, "active again", |fleet| fleet.is_running("alone"));
+
+    let worker = fleet.component("alone", "worker").unwrap();
+    assert_eq!(worker.epoch, 1);
+    assert!(worker.run > 1, "runs never go back through a restart");
+}
+
+#[test]
+fn a_split_runs_both_sides_and_one_home_remains_after_the_heal() {
+    let mut fleet = deployed(10);
+    fleet.split(1);
+    fleet.run(Duration::from_secs(30));
+    assert!(!fleet.active_on("fisheye").is_empty(), "{}", fleet.story());
+
+    fleet.heal();
+    fleet.run_until(LONG, "whole again", |fleet| {
+        fleet.is_running("exploration") && fleet.active_on("fisheye").len() == 1
+    });
+    for component in ["fisheye", "anomaly", "camera", "controller", "position"] {
+        assert_eq!(fleet.active_on(component).len(), 1, "{component}\n{}", fleet.story());
+    }
+}

@@ -1,0 +1,4 @@
+//! All tests over the whole house, in one binary.
+
+mod brain;
+mod tidy;
