@@ -8,7 +8,10 @@ use std::{
 use sdr_core::api::{DeployAnswer, StatusView};
 use serde::Serialize;
 
-use super::awaited::{Awaited, frame, shortfall};
+use super::{
+    awaited::{Awaited, frame, shortfall},
+    last_words,
+};
 use crate::{
     Session,
     client::{Client, ClientError},
@@ -55,10 +58,16 @@ pub(super) async fn wait(
         match client.get::<StatusView>("/v1/status").await {
             Ok(status) => {
                 let view = status.systems.iter().find(|system| system.name == answer.system);
-                let awaited = Awaited::of(view, answer.revision);
+                let mut awaited = Awaited::of(view, answer.revision);
                 let frame = frame(&answer.system, view, awaited.as_ref());
                 progress.show(&session.output, frame, &limit)?;
-                if late || awaited.as_ref().is_some_and(Awaited::is_done) {
+                if awaited.as_ref().is_some_and(Awaited::is_done) {
+                    break awaited;
+                }
+                if late {
+                    if let Some(awaited) = &mut awaited {
+                        last_words::add(awaited, &answer.system, &status, client).await;
+                    }
                     break awaited;
                 }
             }

@@ -7,7 +7,11 @@ use sdr_core::{
 };
 use serde::Serialize;
 
-use crate::render::{progress::Frame, status::is_active, units::one_line};
+use crate::render::{
+    progress::Frame,
+    status::is_active,
+    units::{count, one_line},
+};
 
 /// How far a system is, and what is still awaited.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -28,12 +32,15 @@ pub(super) struct Awaited {
 
 /// One component that is not Active.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-struct AwaitedComponent {
-    component: String,
-    home: Option<String>,
+pub(super) struct AwaitedComponent {
+    pub(super) component: String,
+    pub(super) home: Option<String>,
     state: Option<LifecycleState>,
+    restarts: u32,
     reason: String,
     refusals: Vec<Refusal>,
+    /// The last thing that went wrong with it, looked up when the time is over.
+    pub(super) last: Option<String>,
 }
 
 impl AwaitedComponent {
@@ -42,8 +49,10 @@ impl AwaitedComponent {
             component: view.name.clone(),
             home: view.home.clone(),
             state: view.state,
+            restarts: view.restarts,
             reason: one_line(&view.reason),
             refusals: view.refusals.clone(),
+            last: None,
         }
     }
 
@@ -52,7 +61,13 @@ impl AwaitedComponent {
         let name = &self.component;
         match (&self.home, self.state) {
             (None, _) => format!("{name} has no home: {}", self.reason),
-            (Some(home), Some(state)) => format!("{name} is {state} on {home}: {}", self.reason),
+            (Some(home), Some(state)) => {
+                let again = match self.restarts {
+                    0 => String::new(),
+                    more => format!(" after {}", count(more as usize, "restart")),
+                };
+                format!("{name} is {state} on {home}{again}: {}", self.reason)
+            }
             (Some(home), None) => format!("{name} is to start on {home}: {}", self.reason),
         }
     }
@@ -76,6 +91,11 @@ impl Awaited {
         })
     }
 
+    /// Those that are not Active, to learn more of them.
+    pub(super) fn components_mut(&mut self) -> impl Iterator<Item = &mut AwaitedComponent> {
+        self.awaited.iter_mut()
+    }
+
     /// Whether nothing is awaited any more.
     pub(super) fn is_done(&self) -> bool {
         self.awaited.is_empty() && self.unheard.is_empty()
@@ -96,6 +116,7 @@ impl Awaited {
             lines.push(format!("  {}", component.sentence()));
             let refusals = component.refusals.iter();
             lines.extend(refusals.map(|refusal| format!("    {}", one_line(&refusal.to_string()))));
+            lines.extend(component.last.iter().map(|last| format!("    last: {last}")));
         }
         if self.awaited.is_empty() {
             let unheard = self.unheard.iter();

@@ -12,4 +12,5 @@ mod await_system;
 mod awaited;
 mod describe;
 mod duration;
+mod last_words;
 mod problems;

@@ -175,13 +175,24 @@ fn a_wait_that_is_over_says_what_is_awaited_and_why() {
     component["refusals"] = json!([{
         "robot": "robot-1", "constraint": "memory_free", "found": "310 MB", "bar": "500 MB"
     }]);
-    let agent = deploying().on("GET /v1/status", 200, &homeless);
+    let exited = json!({
+        "sequence": 1, "wall_ms": 0, "monotonic_ns": 0, "kind": "exited", "robot": "robot-1",
+        "system": "moon", "component": "camera", "reason": "exit status 3"
+    });
+    let agent = deploying()
+        .on("GET /v1/status", 200, &homeless)
+        .on("GET /v1/events", 200, &json!([exited]));
     let arguments = ["deploy", &file, "--wait", "--timeout", "1ms", "-o", "json", "--agent"];
     let run = sdr(&[&arguments[..], &[&agent.socket()]].concat());
     assert_eq!(run.code, Some(1));
     let report = run.json();
     assert_eq!(report["done"], json!(false));
     assert_eq!(report["progress"]["awaited"][0]["refusals"][0]["bar"], json!("500 MB"));
-    assert!(run.stderr.contains("camera has no home: no robot fits"), "{}", run.stderr);
-    assert!(run.stderr.contains("robot-1: memory_free 310 MB, bar 500 MB"), "{}", run.stderr);
+    for line in [
+        "  camera has no home: no robot fits\n",
+        "    robot-1: memory_free 310 MB, bar 500 MB\n",
+        "    last: exited: exit status 3\n",
+    ] {
+        assert!(run.stderr.contains(line), "{line}: {}", run.stderr);
+    }
 }
