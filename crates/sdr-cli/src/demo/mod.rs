@@ -1,14 +1,163 @@
-//! `sdr demo`: three robots, five components and one move on this machine.
+//! `sdr demo`: the paper's Section III on one machine.
+//!
+//! ```text
+//!  need (enough memory?) ─▶ fleet (folder, ports, three agents) + stage (the world, the truth)
+//!     ─▶ story: deploy ─▶ drive ─▶ fade ─▶ report          watch: looks at all agents, each round
+//!                                                           board: what the terminal shows of it
+//! ```
+//!
+//! Whatever way it ends, dropping [`fleet::Fleet`] and [`stage::Stage`] leaves no process, no
+//! shared memory and no temporary file behind.
 
-use std::process::ExitCode;
+mod board;
+mod ending;
+mod fleet;
+mod need;
+mod stage;
+mod story;
+mod system;
+mod watch;
+
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use clap::Args;
+use tokio::signal::unix::{SignalKind, signal};
 
 use crate::{Session, failure::Failure};
 
-/// Arguments of `sdr demo`.
-#[derive(Debug, clap::Args)]
-pub(crate) struct DemoArgs {}
+/// The robots of the demo, in the order of the paper.
+pub(crate) const ROBOTS: [&str; 3] = ["robot-1", "robot-2", "robot-3"];
+/// Highest number that is tried for a folder of reports.
+const FOLDERS_MAX: u32 = 10_000;
 
-/// Runs the demo.
-pub(crate) async fn run(_args: DemoArgs, _session: &Session) -> Result<ExitCode, Failure> {
-    Err(Failure::new("the demo is not built in yet"))
+/// Runs three robots, five components and one move on this machine.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// Where the report goes [default: the first free ./sdr-demo-N]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Who holds the coordinator role at the start
+    #[arg(long, value_name = "ROBOT", value_parser = ROBOTS)]
+    coordinator: Option<String>,
+    /// Components touch no 500 MB each
+    #[arg(long)]
+    no_ballast: bool,
+    /// Cameras replay the PNG and JPEG pictures of this folder instead of looking at the world
+    #[arg(long, value_name = "DIR")]
+    images: Option<PathBuf>,
+    /// Leave the fleet up after the report, until Ctrl-C
+    #[arg(long)]
+    keep: bool,
+}
+
+/// What was asked for, checked.
+#[derive(Debug)]
+struct Plan {
+    out: PathBuf,
+    coordinator: Option<String>,
+    ballast: bool,
+    images: Option<PathBuf>,
+    keep: bool,
+}
+
+impl DemoArgs {
+    fn checked(self) -> Result<Plan, Failure> {
+        let images = match self.images {
+            None => None,
+            Some(folder) => Some(pictures(&folder)?),
+        };
+        let out = match self.out {
+            Some(out) => out,
+            None => free_folder(Path::new("."))?,
+        };
+        let (coordinator, ballast) = (self.coordinator, !self.no_ballast);
+        Ok(Plan { out, coordinator, ballast, images, keep: self.keep })
+    }
+}
+
+/// Carries out `sdr demo`. A signal ends it at any moment, and whatever it made goes with it.
+pub(crate) async fn run(args: DemoArgs, session: &Session) -> Result<ExitCode, Failure> {
+    let plan = args.checked()?;
+    need::check(plan.ballast)?;
+    let stopped = stop_signal()?;
+    tokio::select! {
+        ended = story::play(&plan, session) => ended,
+        word = stopped => Err(Failure::new(format!(
+            "the demo was stopped ({word}); nothing is left behind"
+        ))),
+    }
+}
+
+/// Waits for whatever asks us to stop, and says what it was.
+fn stop_signal() -> Result<impl Future<Output = &'static str>, Failure> {
+    let listen = |kind| {
+        signal(kind).map_err(|error| Failure::new(format!("cannot listen to signals: {error}")))
+    };
+    let mut interrupt = listen(SignalKind::interrupt())?;
+    let mut terminate = listen(SignalKind::terminate())?;
+    let mut hangup = listen(SignalKind::hangup())?;
+    Ok(async move {
+        tokio::select! {
+            _ = interrupt.recv() => "Ctrl-C",
+            _ = terminate.recv() => "SIGTERM",
+            _ = hangup.recv() => "the terminal closed",
+        }
+    })
+}
+
+/// The folder with its real path, when there is a picture in it.
+fn pictures(folder: &Path) -> Result<PathBuf, Failure> {
+    let wrong =
+        |error: std::io::Error| Failure::Usage(format!("--images {}: {error}", folder.display()));
+    let is_picture = |path: &Path| {
+        let word = path.extension().and_then(|word| word.to_str()).map(str::to_ascii_lowercase);
+        matches!(word.as_deref(), Some("png" | "jpg" | "jpeg"))
+    };
+    for entry in std::fs::read_dir(folder).map_err(wrong)? {
+        if is_picture(&entry.map_err(wrong)?.path()) {
+            return std::fs::canonicalize(folder).map_err(wrong);
+        }
+    }
+    let folder = folder.display();
+    Err(Failure::Usage(format!(
+        "--images {folder}: no picture there; allowed: a folder with *.png, *.jpg or *.jpeg"
+    )))
+}
+
+/// The first `sdr-demo-N` that is not there yet.
+fn free_folder(parent: &Path) -> Result<PathBuf, Failure> {
+    let folders = (1..=FOLDERS_MAX).map(|number| parent.join(format!("sdr-demo-{number}")));
+    let free = folders.into_iter().find(|folder| !folder.exists());
+    free.ok_or_else(|| {
+        Failure::Usage(format!("{FOLDERS_MAX} reports are here already; give --out DIR"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reports_are_numbered_and_none_is_overwritten() {
+        let parent = tempfile::tempdir().unwrap();
+        assert!(free_folder(parent.path()).unwrap().ends_with("sdr-demo-1"));
+        std::fs::create_dir(parent.path().join("sdr-demo-1")).unwrap();
+        assert!(free_folder(parent.path()).unwrap().ends_with("sdr-demo-2"));
+    }
+
+    #[test]
+    fn a_folder_without_pictures_is_wrong_usage() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("notes.txt"), "x").unwrap();
+        match pictures(folder.path()) {
+            Err(Failure::Usage(text)) => assert!(text.contains("*.png"), "{text}"),
+            other => panic!("{other:?}"),
+        }
+        assert!(matches!(pictures(&folder.path().join("no")), Err(Failure::Usage(_))));
+        std::fs::write(folder.path().join("A.PNG"), "x").unwrap();
+        assert!(pictures(folder.path()).is_ok());
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{
     extra::{Extra, TruthPoint},
-    link::{Counts, Pause},
+    link::{Counts, Link, Pause},
     read::Fix,
     run::{Move, Run},
 };
@@ -104,8 +104,8 @@ impl Figures {
             *at <= first.active_ns && at.saturating_add(CAUSE_WITHIN_NS) >= first.active_ns
         };
         let raised = run.events_of("condition-raised").map(|event| {
-            let over_ms = number(event, "held_over_ms").unwrap_or(0.0).max(0.0);
-            event.monotonic_ns.saturating_sub(nanoseconds(over_ms))
+            let over = number(event, "held_over_ns").map_or(event.monotonic_ns, whole);
+            over.min(event.monotonic_ns)
         });
         let gone = run.events_of("robot-gone").map(|event| event.monotonic_ns);
         self.trouble_ns = raised.chain(gone).filter(explains).min();
@@ -121,7 +121,7 @@ impl Figures {
             done = done.max(one.active_ns);
             let outputs = format!("{}.", one.component);
             for (name, link) in run.links.iter().filter(|(name, _)| name.starts_with(&outputs)) {
-                match link.heard_ns(one.epoch) {
+                match heard_ns(run, name, link, one.epoch) {
                     Some(at) => done = done.max(at),
                     None => self.not_recovered.push(format!("{name}: new home never heard")),
                 }
@@ -167,6 +167,15 @@ fn with<'a>(known: &'a [String], seen: impl IntoIterator<Item = &'a String>) -> 
 pub(crate) fn number(event: &sdr_core::recording::EventSample, name: &str) -> Option<f64> {
     let index = event.number_names.iter().position(|word| word == name)?;
     event.number_values.get(index).copied().filter(|value| value.is_finite())
+}
+
+/// When the consumer of a connection had a sample of `epoch`: its agent says so at once, and its
+/// counters say so later; the earlier of both.
+fn heard_ns(run: &Run, name: &str, link: &Link, epoch: u64) -> Option<u64> {
+    let said = run
+        .events_of("heard")
+        .filter(|event| event.epoch >= epoch && run.name(&event.system, &event.reason) == name);
+    said.map(|event| event.monotonic_ns).chain(link.heard_ns(epoch)).min()
 }
 
 /// The longest pause of a stream of moments that overlaps a window, and the median of all before it.
@@ -220,8 +229,8 @@ fn truth_at(truth: &[TruthPoint], at_ns: u64) -> Option<(f64, f64)> {
     clippy::cast_sign_loss,
     reason = "`as` holds what is negative or too large at the ends of u64"
 )]
-fn nanoseconds(ms: f64) -> u64 {
-    (ms * 1e6) as u64
+fn whole(value: f64) -> u64 {
+    value as u64
 }
 
 #[cfg(test)]

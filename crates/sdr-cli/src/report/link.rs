@@ -50,7 +50,7 @@ impl Link {
     pub(crate) fn heard_ns(&self, epoch: u64) -> Option<u64> {
         let knows = |sample: &&ConnectionSample| sample.epoch >= epoch && sample.last_ns > 0;
         let sample = self.samples.iter().find(knows)?;
-        let before = self.samples.iter().any(|other| {
+        let mut before = self.samples.iter().any(|other| {
             other.robot == sample.robot
                 && other.monotonic_ns < sample.monotonic_ns
                 && other.first_ns == sample.first_ns
@@ -86,9 +86,8 @@ impl Link {
             }
         }
         let period = |sample: &&ConnectionSample| sample.period_median_ns > 0;
-        let before = self.samples.iter().filter(|sample| sample.monotonic_ns <= from_ns);
-        let median =
-            before.filter(period).next_back().or_else(|| self.samples.iter().rfind(period));
+        let mut before = self.samples.iter().filter(|sample| sample.monotonic_ns <= from_ns);
+        let median = before.rfind(period).or_else(|| self.samples.iter().rfind(period));
         longest.map(|gap_max_ns| Pause {
             gap_max_ns,
             period_median_ns: median.map(|sample| sample.period_median_ns),

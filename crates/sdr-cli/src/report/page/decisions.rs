@@ -6,25 +6,32 @@ use super::{section, table};
 use crate::report::Report;
 
 /// Kinds that tell how the deployment came about.
-const ALLOCATION: [&str; 5] = ["role-taken", "deployed", "planned", "placed", "homeless"];
+const ALLOCATION: [&str; 6] =
+    ["role-taken", "deployed", "planned", "plan-failed", "placed", "homeless"];
 /// Kinds that tell how trouble was met.
-const RECOVERY: [&str; 16] = [
+const RECOVERY: [&str; 22] = [
     "condition-raised",
     "condition-cleared",
     "robot-gone",
     "robot-alive",
     "exited",
-    "restarted",
+    "hung",
+    "error",
+    "restart",
+    "role-taken",
     "planned",
+    "plan-failed",
     "placed",
     "homeless",
     "move-started",
     "move-prepared",
-    "assigned",
+    "move-failed",
     "active",
     "heard",
     "fenced",
     "moved",
+    "drained",
+    "held",
 ];
 /// Most rows of the list of all events.
 const EVENTS_MAX: usize = 5000;
@@ -132,7 +139,8 @@ fn why(event: &EventSample) -> String {
     }
 }
 
-/// Bytes as megabytes, others with as many decimals as they need.
+/// Bytes as megabytes, others with as many decimals as they need. Moments of the machine's clock
+/// say nothing to people.
 fn plain(name: &str, value: f64) -> String {
     if name.ends_with("_bytes") && value.abs() >= 1e6 {
         return format!("{:.0} MB", value / 1e6);

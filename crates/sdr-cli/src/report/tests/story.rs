@@ -188,9 +188,13 @@ impl Story {
         }
         let words = "rssi-low: median -54.9 dBm, bar -52.5 dBm, held 6.0 s";
         let mut raised = event(21_000, "robot-1", "condition-raised", "", words);
-        raised.number_names.push("held_over_ms".to_owned());
-        raised.number_values.push(20.0);
+        raised.number_names.push("held_over_ns".to_owned());
+        raised.number_values.push(20_980e6);
         self.add("robot-1", 21_000, &raised);
+        let label = "anomaly.danger -> controller.danger";
+        let mut heard = event(21_380, "robot-2", "heard", "controller", label);
+        heard.epoch = 2;
+        self.add("robot-2", 21_380, &heard);
         for component in ["fisheye", "anomaly"] {
             let words = "robot-3: 310 MB left, recovery bar 250 MB";
             self.add("robot-2", 21_050, &event(21_050, "robot-2", "placed", component, words));

@@ -1,0 +1,411 @@
+//! The five steps, each with what it waits for and for how long at most.
+
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use sdr_core::{
+    api::{DeployAnswer, DeployRequest, SystemView},
+    spec::SystemSpec,
+};
+use sdr_lab::world::monotonic_ns;
+use serde::Deserialize;
+
+use super::{
+    Plan,
+    board::{Board, Step},
+    ending,
+    fleet::{self, Fleet},
+    stage::{DRIVEN, FADING, Stage},
+    system::{self, Available},
+    watch::{LOOK_EVERY, Watch},
+};
+use crate::{
+    Session,
+    failure::Failure,
+    locate,
+    output::Format,
+    render::status::is_active,
+    report::{
+        Report,
+        extra::{self, Bars, Coordinator, Extra},
+        machine::Machine,
+    },
+};
+
+/// Who gets the system from the operator: the paper's Robot-1.
+const RECEIVER: &str = "robot-1";
+/// Who is watched while the radio of the receiver fades.
+const WITNESS: &str = "robot-2";
+/// Table V and Table VI.
+const BARS: Bars = Bars {
+    allocation_memory_bytes: 500_000_000,
+    recovery_memory_bytes: 200_000_000,
+    recovery_rssi_dbm: -52.5,
+};
+/// What leaves the fading robot.
+const MOVED: [&str; 2] = ["fisheye", "anomaly"];
+
+/// Plays it.
+pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Failure> {
+    let folder = fleet::folder()?;
+    for program in system::executables(folder.path())? {
+        locate::component(&program)?;
+    }
+    let world = folder.path().join("w");
+    let stage = Stage::start(&world)?;
+    let bodies = stage.bodies(&world);
+    let fleet = Fleet::start(folder, &bodies, plan.coordinator.as_deref())?;
+    let board = Board::new(session, BARS);
+    let watch = Watch::default();
+    // Dropped in this order: first the agents and all they started, then the world.
+    let mut story =
+        Story { fleet, stage, board, watch, plan, session, coordinator: Coordinator::default() };
+    story.meet().await?;
+    let spec = story.deploy().await?;
+    story.drive().await?;
+    story.fade().await?;
+    let report = story.report(&spec).await?;
+    if plan.keep {
+        // The signal that ends the demo drops this.
+        return std::future::pending().await;
+    }
+    drop(story);
+    if session.output.format() == Format::Json {
+        session.output.json(&report.summary)?;
+    } else {
+        session.output.line(&ending::further())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+struct Story<'a> {
+    fleet: Fleet,
+    stage: Stage,
+    board: Board,
+    watch: Watch,
+    plan: &'a Plan,
+    session: &'a Session,
+    coordinator: Coordinator,
+}
+
+/// `GET /v1/recording`.
+#[derive(Deserialize)]
+struct RecordingView {
+    path: PathBuf,
+}
+
+impl Story<'_> {
+    /// Step 1: all agents answer, see each other and have a coordinator.
+    async fn meet(&mut self) -> Result<(), Failure> {
+        self.board.doing("3 agents started on loopback");
+        self.board
+            .wait_for(&["three agents that see each other and agree on a coordinator".into()]);
+        let wanted = self.plan.coordinator.clone();
+        let holder = self
+            .wait(Duration::from_secs(20), |story| {
+                let holder = story.watch.agreed_coordinator()?;
+                let right = wanted.as_deref().is_none_or(|wanted| wanted == holder);
+                right.then(|| holder.to_owned())
+            })
+            .await?;
+        self.board.finish(format!("3 agents up on loopback, coordinator {holder}"), Step::Deploy);
+        self.coordinator.at_start = Some(holder);
+        Ok(())
+    }
+
+    /// Step 2: all components are active and heard.
+    async fn deploy(&mut self) -> Result<SystemSpec, Failure> {
+        let client = &self.fleet.agent(RECEIVER).client;
+        let available: Available = client.get("/v1/components").await?;
+        let empty = self.fleet.empty_folder()?;
+        let (ballast, images) = (self.plan.ballast, self.plan.images.as_deref());
+        let spec = system::make(&available.components, &empty, ballast, images)?;
+        let since = Instant::now();
+        let request = DeployRequest { system: spec.clone() };
+        let answer: DeployAnswer = client.post("/v1/deploy", &request).await?;
+        let why = match ballast {
+            true => "each allocates and touches 500 MB, as the paper's do",
+            false => "without ballast: they only start, connect and run",
+        };
+        self.board.wait_for(&["five components active, five connections heard".into(), why.into()]);
+        self.wait(Duration::from_secs(60), |story| {
+            let system = story.watch.system(RECEIVER).filter(|one| one.revision >= answer.revision);
+            story.board.doing(progress(system));
+            system.filter(|system| is_up(system)).map(|_| ())
+        })
+        .await?;
+        let took = since.elapsed().as_secs_f64();
+        self.board.finish(format!("5 of 5 active, heard after {took:.1} s"), Step::Drive);
+        Ok(spec)
+    }
+
+    /// Step 3: the robot drives, stops for the object, goes on.
+    async fn drive(&mut self) -> Result<(), Failure> {
+        if self.plan.images.is_some() {
+            // The cameras show a folder's pictures: what stands in the world is not seen.
+            self.board
+                .wait_for(&["the cameras to have shown some of the folder's pictures".into()]);
+            self.let_pass(Duration::from_secs(8)).await?;
+        } else {
+            self.stop_for_the_object().await?;
+        }
+        let text = self.driven();
+        self.board.finish(text, Step::Fade);
+        Ok(())
+    }
+
+    async fn stop_for_the_object(&mut self) -> Result<(), Failure> {
+        self.board.wait_for(&["the robot to drive".into()]);
+        self.wait_for_motion(true).await?;
+        self.let_pass(Duration::from_secs(3)).await?;
+        self.stage.show_object()?;
+        self.watch.say("world", "a dangerous object stands before the robot");
+        self.board.wait_for(&[
+            "the robot to stop: anomaly must see the object and tell controller".into(),
+        ]);
+        self.wait_for_motion(false).await?;
+        self.let_pass(Duration::from_millis(1500)).await?;
+        self.stage.hide_object();
+        self.watch.say("world", "the object is gone");
+        self.board.wait_for(&["the robot to go on: nothing dangerous is seen any more".into()]);
+        self.wait_for_motion(true).await?;
+        self.let_pass(Duration::from_millis(1500)).await
+    }
+
+    /// Step 4: the radio fades, the condition holds, two components move.
+    async fn fade(&mut self) -> Result<(), Failure> {
+        self.stage.fade()?;
+        let radio = Stage::radio();
+        let text = format!("radio fades: {:.1} -> {:.1} dBm", radio.from_dbm, radio.to_dbm);
+        self.watch.say(FADING, &text);
+        self.board.wait_for(&[
+            format!("rssi-low on {FADING} to hold for 6 s, then fisheye and anomaly"),
+            "move to where more than recovery's 200 MB stay free; allocation wants 500 MB".into(),
+        ]);
+        self.wait(Duration::from_secs(60), |story| {
+            let text = story.fading();
+            story.board.doing(text);
+            story.watch.system(WITNESS).filter(|system| has_moved(system)).map(|_| ())
+        })
+        .await?;
+        self.board.wait_for(&["the new homes to settle".into()]);
+        self.let_pass(Duration::from_secs(4)).await?;
+        let system = self.watch.system(WITNESS);
+        let component = system.and_then(|system| {
+            system.components.iter().find(|component| component.name == MOVED[0])
+        });
+        let home = component.and_then(|component| component.home.clone()).unwrap_or_default();
+        let epoch = component.map_or(0, |component| component.epoch);
+        let text = format!("fisheye, anomaly: {FADING} -> {home}, epoch {epoch}");
+        self.board.finish(text, Step::Report);
+        Ok(())
+    }
+
+    /// Step 5: the recordings become a report; the fleet ends, unless it is kept.
+    async fn report(&mut self, spec: &SystemSpec) -> Result<Report, Failure> {
+        self.board.wait_for(&["recordings, then the report".into()]);
+        self.watch.look(&self.fleet).await;
+        self.board.show(self.session, &self.watch)?;
+        self.coordinator.at_end = self.watch.agreed_coordinator().map(str::to_owned);
+        let until_ns = monotonic_ns();
+        let mut recordings = Vec::new();
+        for agent in &self.fleet.agents {
+            let view: RecordingView = agent.client.get("/v1/recording").await?;
+            recordings.push(copy(&view.path, &self.plan.out)?);
+        }
+        let extra = self.extra(spec, until_ns);
+        if !self.plan.keep {
+            let path = format!("/v1/systems/{}", spec.name);
+            // Ending the agents ends the system as well.
+            let _ = self.fleet.agent(RECEIVER).client.delete(&path).await;
+            self.fleet.stop();
+        }
+        let text =
+            serde_json::to_string(&extra).map_err(|error| Failure::new(error.to_string()))?;
+        let file = self.plan.out.join(extra::FILE);
+        std::fs::write(&file, text)
+            .map_err(|error| Failure::new(format!("cannot write {}: {error}", file.display())))?;
+        let report = Report::make(&recordings, extra)?;
+        let page = report.write(&self.plan.out)?;
+        self.board.finish(page.display().to_string(), Step::Report);
+        self.board.show(self.session, &self.watch)?;
+        let mut lines = ending::lines(&report, &page);
+        if self.plan.keep {
+            lines.extend(ending::kept(self.fleet.agent(RECEIVER).socket()));
+        }
+        self.session.output.progress(&(lines.join("\n") + "\n"))?;
+        Ok(report)
+    }
+
+    fn extra(&self, spec: &SystemSpec, until_ns: u64) -> Extra {
+        Extra {
+            ballast: Some(self.plan.ballast),
+            machine: Some(Machine::here()),
+            radio: Some(Stage::radio()),
+            bars: Some(BARS),
+            coordinator: self.coordinator.clone(),
+            components: spec.components.iter().map(|one| one.name.to_string()).collect(),
+            connections: spec.connections.iter().map(|one| one.label()).collect(),
+            until_ns: Some(until_ns),
+            position_topic: Some(format!("/{}/position/odometry", spec.name)),
+            truth: self.stage.truth(),
+            commands_ns: self.stage.commands_ns(),
+            detector: self.plan.images.is_none().then(|| self.stage.detector(until_ns)),
+        }
+    }
+
+    /// Looks again and again until `done` gives something; too late or with an agent gone it fails
+    /// and says what was awaited, the last status and what the agents wrote last.
+    async fn wait<T>(
+        &mut self,
+        limit: Duration,
+        mut done: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Result<T, Failure> {
+        let since = Instant::now();
+        loop {
+            self.watch.look(&self.fleet).await;
+            let found = done(self);
+            self.board.show(self.session, &self.watch)?;
+            if let Some(found) = found {
+                return Ok(found);
+            }
+            let ended = self.fleet.agents.iter_mut().find_map(|agent| {
+                agent.ended().map(|status| format!("the agent of {} ended ({status})", agent.robot))
+            });
+            if let Some(ended) = ended {
+                return Err(self.failed(&ended));
+            }
+            if since.elapsed() >= limit {
+                return Err(self.failed(&format!("not within {} s", limit.as_secs())));
+            }
+            tokio::time::sleep(LOOK_EVERY).await;
+        }
+    }
+
+    async fn let_pass(&mut self, time: Duration) -> Result<(), Failure> {
+        let until = Instant::now() + time;
+        self.wait(time + Duration::from_secs(20), |story| {
+            if story.board.step() == Step::Drive {
+                let text = story.driven();
+                story.board.doing(text);
+            }
+            (Instant::now() >= until).then_some(())
+        })
+        .await
+    }
+
+    async fn wait_for_motion(&mut self, wanted: bool) -> Result<(), Failure> {
+        self.wait(Duration::from_secs(20), |story| {
+            let text = story.driven();
+            story.board.doing(text);
+            let rover = story.stage.driven()?;
+            (rover.driving == wanted).then_some(())
+        })
+        .await
+    }
+
+    /// `3.1 m, stopped 1 time`.
+    fn driven(&self) -> String {
+        match self.stage.driven() {
+            None => String::new(),
+            Some(rover) => {
+                let times = crate::render::units::count(rover.stops as usize, "time");
+                format!("{DRIVEN} drove {:.1} m, stopped {times}", rover.distance_m)
+            }
+        }
+    }
+
+    /// `robot-1 at -55.0 dBm, bar -52.5 dBm, held 4.2 of 6.0 s`.
+    fn fading(&self) -> String {
+        let level = self.watch.itself(FADING).and_then(|view| view.rssi_dbm);
+        let level = level.map_or_else(|| "unknown".to_owned(), |level| format!("{level:.1} dBm"));
+        let conditions = self.watch.statuses.get(FADING).map(|status| &status.conditions);
+        let held = conditions.and_then(|list| list.iter().find(|one| one.cause == "rssi-low"));
+        let held = held.map(|one| {
+            let part = |ms: u64| Duration::from_millis(ms).as_secs_f64();
+            format!(", held {:.1} of {:.1} s", part(one.held_ms), part(one.hold_ms))
+        });
+        let bar = BARS.recovery_rssi_dbm;
+        format!("{FADING} at {level}, bar {bar:.1} dBm{}", held.unwrap_or_default())
+    }
+
+    /// Everything a person needs to see what went wrong.
+    fn failed(&self, what: &str) -> Failure {
+        let mut lines = vec![format!("awaited in vain ({what}): {}", self.board.awaited())];
+        if let Some(status) = self.watch.any() {
+            lines.push(format!("last status, seen from {}:", status.seen_from));
+            let screen = crate::render::status::screen(status, 100);
+            lines.extend(screen.into_iter().map(|line| format!("  {line}")));
+        }
+        for (robot, reason) in &self.watch.unanswered {
+            lines.push(format!("{robot} does not answer: {reason}"));
+        }
+        for agent in &self.fleet.agents {
+            lines.push(format!("last lines of the agent of {}:", agent.robot));
+            let last = agent.last_lines(8).into_iter();
+            lines.extend(last.map(|line| format!("  {}", crate::render::units::one_line(&line))));
+        }
+        Failure::new(lines.join("\n"))
+    }
+}
+
+/// `3 of 5 active, 2 of 5 connections heard`.
+fn progress(system: Option<&SystemView>) -> String {
+    let Some(system) = system else { return "accepted, to be placed".to_owned() };
+    let active = system.components.iter().filter(|component| is_active(component)).count();
+    let heard = system.connections.iter().filter(|connection| connection.heard).count();
+    let (components, connections) = (system.components.len(), system.connections.len());
+    format!("{active} of {components} active, {heard} of {connections} connections heard")
+}
+
+fn is_up(system: &SystemView) -> bool {
+    system.components.iter().all(is_active) && system.connections.iter().all(|one| one.heard)
+}
+
+/// Whether what should leave has left and everything is up again.
+fn has_moved(system: &SystemView) -> bool {
+    let left = |name: &str| {
+        let component = system.components.iter().find(|component| component.name == name);
+        component.is_some_and(|one| one.home.as_deref().is_some_and(|home| home != FADING))
+    };
+    MOVED.iter().all(|name| left(name)) && is_up(system)
+}
+
+/// Copies a recording into the folder of reports.
+fn copy(recording: &Path, out: &Path) -> Result<PathBuf, Failure> {
+    let name = recording.file_name().unwrap_or_default();
+    let to = out.join(name);
+    std::fs::create_dir_all(out).and_then(|()| std::fs::copy(recording, &to)).map_err(|error| {
+        Failure::new(format!("cannot copy {} to {}: {error}", recording.display(), to.display()))
+    })?;
+    Ok(to)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::ROBOTS, *};
+    use crate::render::fixture;
+
+    #[test]
+    fn the_move_is_done_when_both_left_and_all_is_up() {
+        let mut system = fixture::exploration();
+        assert!(has_moved(&system) && is_up(&system));
+        system.connections[1].heard = false;
+        assert!(!has_moved(&system));
+        system.connections[1].heard = true;
+        system.components[1].home = Some(FADING.to_owned());
+        assert!(!has_moved(&system));
+        assert!(ROBOTS.contains(&RECEIVER) && ROBOTS.contains(&WITNESS));
+    }
+
+    #[test]
+    fn progress_counts_components_and_connections() {
+        let mut system = fixture::exploration();
+        system.components[0].state = None;
+        assert_eq!(progress(Some(&system)), "4 of 5 active, 5 of 5 connections heard");
+        assert_eq!(progress(None), "accepted, to be placed");
+    }
+}
