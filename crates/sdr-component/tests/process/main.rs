@@ -1,4 +1,9 @@
 //! `run()` in a process of its own, against an agent as small as can be.
+#![expect(
+    clippy::unwrap_used,
+    clippy::wildcard_enum_match_arm,
+    reason = "what a test cannot go on without, and words it does not wait for"
+)]
 
 mod agent;
 
