@@ -29,6 +29,8 @@ pub(crate) use stream::{Chunks, Events};
 const ANSWER_BYTES_MAX: usize = 16 << 20;
 /// How long an agent may take for an answer: it gives its disk 10 s, and then says so itself.
 const ANSWER_WITHIN: Duration = Duration::from_secs(15);
+/// How long a hint may take.
+const HINT_WITHIN: Duration = Duration::from_secs(1);
 
 /// Speaks with one agent.
 #[derive(Clone, Debug)]
@@ -48,6 +50,11 @@ impl Client {
     /// The agent at this Unix socket.
     pub(crate) fn at(socket: impl Into<PathBuf>) -> Self {
         Self { socket: socket.into(), within: ANSWER_WITHIN }
+    }
+
+    /// The same agent, given up soon: for what is nice to know.
+    pub(crate) fn hurried(&self) -> Self {
+        Self { socket: self.socket.clone(), within: HINT_WITHIN }
     }
 
     /// Where the agent is looked for.

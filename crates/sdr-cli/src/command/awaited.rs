@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::render::{
     progress::Frame,
-    status::is_active,
+    status::{is_active, state_words},
     units::{count, one_line},
 };
 
@@ -66,6 +66,7 @@ impl AwaitedComponent {
                     0 => String::new(),
                     more => format!(" after {}", count(more as usize, "restart")),
                 };
+                let state = state_words(state);
                 format!("{name} is {state} on {home}{again}: {}", self.reason)
             }
             (Some(home), None) => format!("{name} is to start on {home}: {}", self.reason),

@@ -7,7 +7,10 @@ use sdr_core::api::{EventView, StatusView};
 use super::awaited::Awaited;
 use crate::{
     client::Client,
-    render::units::{one_line, shorten},
+    render::{
+        status::Placed,
+        units::{one_line, shorten},
+    },
 };
 
 /// Kinds of events that belong to a start that goes well.
@@ -27,19 +30,25 @@ const ROUTINE: [&str; 11] = [
 /// Most characters of one event.
 const WORDS_MAX: usize = 300;
 
-/// Adds to each awaited component the last thing that went wrong with it, where its home's
-/// agent can be asked from here. What cannot be learnt is left out: it is a hint.
+/// Adds to each awaited component the last thing that went wrong with it.
 pub(super) async fn add(awaited: &mut Awaited, system: &str, status: &StatusView, client: &Client) {
     for component in awaited.components_mut() {
-        let asked = match &component.home {
-            Some(home) if *home != status.seen_from => far_client(home, status),
-            Some(_) | None => Some(client.clone()),
-        };
-        let Some(asked) = asked else { continue };
-        if let Ok(events) = asked.get::<Vec<EventView>>("/v1/events").await {
-            component.last = last_of(&events, system, &component.component);
-        }
+        let Some(home) = &component.home else { continue };
+        let (system, component_name) = (system.into(), component.component.clone());
+        let placed = Placed { system, component: component_name, home: home.clone() };
+        component.last = of(&placed, status, client).await;
     }
+}
+
+/// The last thing that went wrong with a component, where its home's agent can be asked
+/// from here. What cannot be learnt is left out: it is a hint.
+pub(super) async fn of(placed: &Placed, status: &StatusView, client: &Client) -> Option<String> {
+    let asked = match placed.home == status.seen_from {
+        true => client.clone(),
+        false => far_client(&placed.home, status)?,
+    };
+    let events: Vec<EventView> = asked.hurried().get("/v1/events").await.ok()?;
+    last_of(&events, &placed.system, &placed.component)
 }
 
 /// The agent of another robot of this machine.
@@ -56,7 +65,11 @@ fn last_of(events: &[EventView], system: &str, component: &str) -> Option<String
             && !ROUTINE.contains(&event.kind.as_str())
     };
     let last = events.iter().rev().find(about)?;
-    let words = format!("{}: {}", last.event.kind, last.event.reason);
+    let (kind, reason) = (&last.event.kind, &last.event.reason);
+    let words = match reason.strip_prefix(kind.as_str()).is_some_and(|rest| rest.starts_with(':')) {
+        true => reason.clone(),
+        false => format!("{kind}: {reason}"),
+    };
     Some(shorten(&one_line(&words), WORDS_MAX))
 }
 

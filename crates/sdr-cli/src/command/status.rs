@@ -5,7 +5,14 @@ use std::process::ExitCode;
 use sdr_core::api::StatusView;
 use serde::Serialize;
 
-use crate::{Session, client::Client, failure::Failure, output::Format, render};
+use super::last_words;
+use crate::{
+    Session,
+    client::Client,
+    failure::Failure,
+    output::Format,
+    render::{self, status::Problem},
+};
 
 /// Arguments of `sdr status`.
 #[derive(Debug, clap::Args)]
@@ -22,18 +29,24 @@ struct StatusReport<'a> {
 
 /// Asks once and shows.
 pub(crate) async fn run(_args: StatusArgs, session: &Session) -> Result<ExitCode, Failure> {
-    let view: StatusView = Client::of(session)?.get("/v1/status").await?;
-    let problems = render::status::problems(&view);
+    let client = Client::of(session)?;
+    let view: StatusView = client.get("/v1/status").await?;
+    let mut problems = render::status::problems(&view);
+    for problem in &mut problems {
+        let Some(placed) = &problem.component else { continue };
+        let last = last_words::of(placed, &view, &client).await;
+        problem.details.extend(last.map(|last| format!("last: {last}")));
+    }
     let code = if problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
     match session.output.format() {
         Format::Text => {
             let (columns, _) = session.output.size();
-            for line in render::status::screen(&view, columns) {
+            for line in render::status::screen(&view, &problems, columns) {
                 session.output.line(&line)?;
             }
         }
         Format::Json => {
-            let problems = problems.into_iter().map(|problem| problem.text).collect();
+            let problems = problems.into_iter().map(Problem::sentence).collect();
             session.output.json(&StatusReport { view: &view, problems })?;
         }
     }

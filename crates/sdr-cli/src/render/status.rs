@@ -11,9 +11,9 @@ use super::{
 };
 
 /// The whole screen.
-pub(crate) fn screen(view: &StatusView, columns: usize) -> Vec<String> {
+pub(crate) fn screen(view: &StatusView, problems: &[Problem], columns: usize) -> Vec<String> {
     let mut lines = Vec::new();
-    for problem in problems(view) {
+    for problem in problems {
         lines.extend(wrap(&format!("! {}", problem.text), columns, "  "));
         for detail in &problem.details {
             lines.extend(wrap(&format!("    {detail}"), columns, "      "));
@@ -40,13 +40,33 @@ pub(crate) fn screen(view: &StatusView, columns: usize) -> Vec<String> {
 pub(crate) struct Problem {
     /// A sentence.
     pub(crate) text: String,
-    /// Numbers beside their bars.
+    /// Numbers beside their bars, last words.
     pub(crate) details: Vec<String>,
+    /// The component that it is about, when it has a home that may tell more.
+    pub(crate) component: Option<Placed>,
+}
+
+/// A component with a home.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Placed {
+    /// Its system.
+    pub(crate) system: String,
+    /// Its name.
+    pub(crate) component: String,
+    /// Its home.
+    pub(crate) home: String,
 }
 
 impl Problem {
     fn new(text: String) -> Self {
-        Self { text: one_line(&text), details: Vec::new() }
+        Self { text: one_line(&text), details: Vec::new(), component: None }
+    }
+
+    /// All of it in one line.
+    pub(crate) fn sentence(self) -> String {
+        let mut parts = vec![self.text];
+        parts.extend(self.details);
+        parts.join("; ")
     }
 }
 
@@ -55,7 +75,7 @@ pub(crate) fn problems(view: &StatusView) -> Vec<Problem> {
     let mut problems = Vec::new();
     for system in &view.systems {
         let parts = system.components.iter();
-        problems.extend(parts.filter_map(|component| trouble(component, view)));
+        problems.extend(parts.filter_map(|component| trouble(component, system, view)));
         problems.extend(silent_connections(system));
     }
     let raised = view.conditions.iter().filter(|condition| condition.raised);
@@ -86,7 +106,7 @@ pub(crate) fn problems(view: &StatusView) -> Vec<Problem> {
 }
 
 /// Why a component does not do its work, when it does not.
-fn trouble(component: &ComponentView, view: &StatusView) -> Option<Problem> {
+fn trouble(component: &ComponentView, system: &SystemView, view: &StatusView) -> Option<Problem> {
     let name = &component.name;
     let Some(home) = &component.home else {
         let mut problem = Problem::new(format!("{name} has no home: {}", component.reason));
@@ -98,10 +118,24 @@ fn trouble(component: &ComponentView, view: &StatusView) -> Option<Problem> {
         return Some(Problem::new(format!("{name} was on {home}, which is quiet")));
     }
     let reason = &component.reason;
-    match component.state {
-        Some(LifecycleState::Active) => None,
-        Some(state) => Some(Problem::new(format!("{name} is {state} on {home} ({reason})"))),
-        None => Some(Problem::new(format!("{name} does not run yet on {home} ({reason})"))),
+    let text = match component.state {
+        Some(LifecycleState::Active) => return None,
+        Some(state) => format!("{name} is {} on {home} ({reason})", state_words(state)),
+        None => format!("{name} does not run yet on {home} ({reason})"),
+    };
+    let (system, component) = (system.name.clone(), name.clone());
+    let placed = Placed { system, component, home: home.clone() };
+    Some(Problem { component: Some(placed), ..Problem::new(text) })
+}
+
+/// `created`, but `in error`, as a sentence wants it.
+pub(crate) fn state_words(state: LifecycleState) -> String {
+    match state {
+        LifecycleState::Error => "in error".into(),
+        LifecycleState::Created
+        | LifecycleState::Inactive
+        | LifecycleState::Active
+        | LifecycleState::Finalized => state.to_string(),
     }
 }
 

@@ -48,10 +48,18 @@ fn a_fleet_that_is_well_ends_with_zero_and_one_that_is_not_with_one() {
     assert!(run.stdout.starts_with("1 robot, 1 system"), "{}", run.stdout);
     assert!(run.stdout.lines().all(|line| line.chars().count() <= 80));
 
-    let ill = Agent::new().on("GET /v1/status", 200, &status("error", true));
+    let mut failed = event(1);
+    failed["kind"] = json!("error");
+    failed["reason"] = json!("error: no lens");
+    let ill = Agent::new().on("GET /v1/status", 200, &status("error", true)).on(
+        "GET /v1/events",
+        200,
+        &json!([failed, event(2)]),
+    );
     let run = sdr(&["status", "--agent", &ill.socket()]);
     assert_eq!(run.code, Some(1));
-    assert!(run.stdout.starts_with("! camera is error on robot-1"), "{}", run.stdout);
+    let golden = "! camera is in error on robot-1 (first that fits)\n    last: error: no lens\n\n";
+    assert!(run.stdout.starts_with(golden), "{}", run.stdout);
 }
 
 #[test]

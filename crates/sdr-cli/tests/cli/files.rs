@@ -169,6 +169,11 @@ fn a_deployment_is_up_when_all_are_active_and_heard() {
 fn a_wait_that_is_over_says_what_is_awaited_and_why() {
     let (_folder, file) = folder("moon.yaml", GOOD);
     let mut homeless = status("active", true);
+    let mut viewer = homeless["systems"][0]["components"][0].clone();
+    viewer["name"] = json!("viewer");
+    viewer["state"] = json!("created");
+    viewer["restarts"] = json!(2);
+    homeless["systems"][0]["components"].as_array_mut().unwrap().push(viewer);
     let component = &mut homeless["systems"][0]["components"][0];
     component["home"] = Value::Null;
     component["reason"] = json!("no robot fits");
@@ -177,11 +182,13 @@ fn a_wait_that_is_over_says_what_is_awaited_and_why() {
     }]);
     let exited = json!({
         "sequence": 1, "wall_ms": 0, "monotonic_ns": 0, "kind": "exited", "robot": "robot-1",
-        "system": "moon", "component": "camera", "reason": "exit status 3"
+        "system": "moon", "component": "viewer", "reason": "exit status 3"
     });
-    let agent = deploying()
-        .on("GET /v1/status", 200, &homeless)
-        .on("GET /v1/events", 200, &json!([exited]));
+    let agent = deploying().on("GET /v1/status", 200, &homeless).on(
+        "GET /v1/events",
+        200,
+        &json!([exited]),
+    );
     let arguments = ["deploy", &file, "--wait", "--timeout", "1ms", "-o", "json", "--agent"];
     let run = sdr(&[&arguments[..], &[&agent.socket()]].concat());
     assert_eq!(run.code, Some(1));
@@ -191,6 +198,7 @@ fn a_wait_that_is_over_says_what_is_awaited_and_why() {
     for line in [
         "  camera has no home: no robot fits\n",
         "    robot-1: memory_free 310 MB, bar 500 MB\n",
+        "  viewer is created on robot-1 after 2 restarts: first that fits\n",
         "    last: exited: exit status 3\n",
     ] {
         assert!(run.stderr.contains(line), "{line}: {}", run.stderr);

@@ -6,7 +6,7 @@ use super::*;
 use crate::render::fixture;
 
 fn text(view: &StatusView) -> String {
-    let lines = screen(view, 80);
+    let lines = screen(view, &problems(view), 80);
     for line in &lines {
         assert!(line.chars().count() <= 80, "{} columns: {line}", line.chars().count());
     }
@@ -47,7 +47,7 @@ fn what_is_wrong_stands_first_with_numbers_and_bars() {
     view.robots[0].battery_permille = Some(90);
 
     let golden = "\
-! camera is error on robot-2 (robot-1: memory_free 310 MB, bar 500 MB)
+! camera is in error on robot-2 (robot-1: memory_free 310 MB, bar 500 MB)
 ! position has no home: no robot fits
     robot-1: memory_free 310 MB, bar 500 MB
     robot-2: memory_free 310 MB, bar 500 MB
