@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# Builds the release workspace and runs the demo.   ./demo.sh [FLAGS OF sdr demo]
+# For instance: ./demo.sh --no-ballast      ./demo.sh -o json >report.json
+set -euo pipefail
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+source "$here/.ci/missing.sh"
+
+# stdout belongs to the demo: with -o json it holds JSON and nothing else.
+{
+    need_rust
+    # The default members: the agent, the CLI, the components.
+    cargo build --release --locked --manifest-path "$here/Cargo.toml"
+} >&2
+exec "${CARGO_TARGET_DIR:-$here/target}/release/sdr" demo "$@"

@@ -1,0 +1,117 @@
+//! The documents name only what is there, and leave nothing out.
+
+use std::path::Path;
+
+use super::tree::{Page, expect_none, pages, root};
+
+/// First words of paths that begin at the root.
+const TOP: [&str; 9] = [
+    "crates/",
+    "components/",
+    "tests/",
+    "benches/",
+    "docs/",
+    "policies/",
+    "systems/",
+    ".ci/",
+    "./",
+];
+
+/// What stands between single backticks; fenced blocks are left out.
+fn code_spans(text: &str) -> Vec<String> {
+    let mut spans = Vec::new();
+    let mut fenced = false;
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if !fenced {
+            spans.extend(line.split('`').skip(1).step_by(2).map(str::to_owned));
+        }
+    }
+    spans
+}
+
+/// Targets of `[text](target)`; fenced blocks are left out.
+fn links(text: &str) -> Vec<String> {
+    let mut links = Vec::new();
+    let mut fenced = false;
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if !fenced {
+            let targets = line.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+            links.extend(targets.map(str::to_owned));
+        }
+    }
+    links
+}
+
+fn documents() -> Vec<Page> {
+    pages().into_iter().filter(|page| page.path.ends_with(".md")).collect()
+}
+
+#[test]
+fn links_between_documents_lead_somewhere() {
+    let mut findings = Vec::new();
+    for page in documents() {
+        let folder = root().join(&page.path).parent().map(Path::to_owned).unwrap();
+        for link in links(&page.text) {
+            let path = link.split('#').next().unwrap_or_default();
+            let outside = path.contains("://") || path.starts_with("mailto:");
+            if !outside && !path.is_empty() && !folder.join(path).exists() {
+                findings.push(format!("{}: {link}", page.path));
+            }
+        }
+    }
+    expect_none("links to nowhere", &findings);
+}
+
+#[test]
+fn every_path_named_in_the_documents_is_there() {
+    let mut findings = Vec::new();
+    for page in documents() {
+        for span in code_spans(&page.text) {
+            let path = span.split([' ', ':']).next().unwrap_or_default();
+            let whole = !path.contains(['*', '<', '{', '$']);
+            if TOP.iter().any(|top| path.starts_with(top)) && whole && !root().join(path).exists() {
+                findings.push(format!("{}: `{span}`", page.path));
+            }
+        }
+    }
+    expect_none("files that are named and not there", &findings);
+}
+
+#[test]
+fn every_folder_of_sources_has_a_place_in_the_architecture() {
+    let text = std::fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let mut findings = Vec::new();
+    for page in pages().iter().filter(|page| page.path.ends_with(".rs")) {
+        let mut words = page.path.split('/');
+        if let (Some("crates"), Some(name), Some("src"), Some(room), Some(_)) =
+            (words.next(), words.next(), words.next(), words.next(), words.next())
+        {
+            let room = format!("crates/{name}/src/{room}");
+            // A type and its tests may share a folder that only carries the file's name.
+            let alone = root().join(format!("{room}.rs")).exists();
+            if !alone && !text.contains(&room) && !findings.contains(&room) {
+                findings.push(room);
+            }
+        }
+    }
+    expect_none("rooms that ARCHITECTURE.md does not show", &findings);
+}
+
+#[test]
+fn every_page_of_the_docs_can_be_reached_from_their_readme() {
+    let listed = std::fs::read_to_string(root().join("docs/README.md")).unwrap();
+    let mut findings = Vec::new();
+    for page in documents() {
+        if let Some(path) = page.path.strip_prefix("docs/")
+            && path != "README.md"
+            && !listed.contains(&format!("({path})"))
+        {
+            findings.push(page.path.clone());
+        }
+    }
+    expect_none("pages that docs/README.md does not list", &findings);
+}
