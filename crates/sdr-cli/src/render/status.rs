@@ -11,7 +11,12 @@ use super::{
 };
 
 /// The whole screen.
-pub(crate) fn screen(view: &StatusView, problems: &[Problem], columns: usize) -> Vec<String> {
+pub(crate) fn screen(view: &StatusView, columns: usize) -> Vec<String> {
+    screen_with(view, &problems(view), columns)
+}
+
+/// The whole screen, when more was learnt of its problems.
+pub(crate) fn screen_with(view: &StatusView, problems: &[Problem], columns: usize) -> Vec<String> {
     let mut lines = Vec::new();
     for problem in problems {
         lines.extend(wrap(&format!("! {}", problem.text), columns, "  "));
