@@ -5,8 +5,8 @@ use std::time::Duration;
 use sdr_core::{
     id::Name,
     spec::{
-        ComponentSpec, ConnectionSpec, Execution, Isolation, IsolationAction, Launch, Needs,
-        Place, PolicyBytes, PortRef, Qos, Standby, SystemSpec,
+        ComponentSpec, ConnectionSpec, Execution, Isolation, IsolationAction, Launch, Needs, Place,
+        PolicyBytes, PortRef, Qos, Standby, SystemSpec,
     },
     units::{Bytes, Permille},
 };
@@ -39,10 +39,8 @@ pub fn component(word: &str, memory_mega: u64) -> ComponentSpec {
 
 /// `from.port -> to.port`.
 pub fn connection(from: (&str, &str), to: (&str, &str)) -> ConnectionSpec {
-    let port = |(component, port): (&str, &str)| PortRef {
-        component: name(component),
-        port: name(port),
-    };
+    let port =
+        |(component, port): (&str, &str)| PortRef { component: name(component), port: name(port) };
     ConnectionSpec {
         index: 0,
         from: port(from),

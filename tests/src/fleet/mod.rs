@@ -52,8 +52,7 @@ impl Fleet {
         let now = Instant::from_millis(1000);
         let robots = (0..count).map(|number| Robot::new(number, count, memory)).collect();
         let wire = Wire::new(Rng::new(seed), count);
-        let mut fleet =
-            Self { now, robots, wire, sample_at: now, flow_at: now, requests: 0 };
+        let mut fleet = Self { now, robots, wire, sample_at: now, flow_at: now, requests: 0 };
         (0..count).for_each(|number| fleet.switch_on(number));
         fleet
     }

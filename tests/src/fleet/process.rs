@@ -3,11 +3,7 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use sdr_core::{
-    effect::InputWiring,
-    id::ComponentKey,
-    lifecycle::LifecycleState,
-    order::Token,
-    recover::Cause,
+    effect::InputWiring, id::ComponentKey, lifecycle::LifecycleState, order::Token, recover::Cause,
 };
 
 /// How processes of one component behave from now on.

@@ -41,7 +41,11 @@ fn reasons_name_the_robot_the_number_and_the_bar() {
     let fleet = deployed(1);
 
     let position = fleet.component("exploration", "position").unwrap();
-    assert!(position.reason.contains("robot-1: memory_free 310 MB, bar 500 MB"), "{}", position.reason);
+    assert!(
+        position.reason.contains("robot-1: memory_free 310 MB, bar 500 MB"),
+        "{}",
+        position.reason
+    );
     assert!(position.reason.contains("robot-2"), "{}", position.reason);
 }
 

@@ -1,0 +1,208 @@
+//! One real agent and what an operator does with it.
+
+use std::{
+    fs,
+    io::Write,
+    os::unix::process::CommandExt,
+    path::{Path, PathBuf},
+    process::{Child, Command, Output, Stdio},
+};
+
+use rustix::process::{Pid, Signal, kill_process, test_kill_process};
+use sdr_core::api::{EventView, StatusView};
+use sdr_lab::world::RobotPaths;
+
+use super::{LIMIT, Programs, wait_for};
+
+/// An agent process; ended with all its components when dropped.
+pub struct Agent {
+    /// The robot's name.
+    pub name: String,
+    /// Its own folder: configuration, state, socket, log.
+    pub folder: PathBuf,
+    /// Where its mesh listens.
+    pub port: u16,
+    programs: &'static Programs,
+    process: Option<Child>,
+}
+
+impl Agent {
+    pub(super) fn new(fleet: &Path, name: &str, programs: &'static Programs) -> Self {
+        let folder = fleet.join(name.replace("robot-", "r"));
+        fs::create_dir_all(&folder).expect("a folder");
+        Self { name: name.into(), folder, port: 0, programs, process: None }
+    }
+
+    /// Writes robot.toml.
+    pub(super) fn configure(&mut self, number: usize, ports: &[u16], domain: u16, world: &Path) {
+        self.port = ports[number];
+        let body = RobotPaths::new(world, &self.name);
+        let others = ports.iter().filter(|port| **port != self.port);
+        let seeds: Vec<String> = others.map(|port| format!("\"127.0.0.1:{port}\"")).collect();
+        let text = format!(
+            r#"[robot]
+name = "{name}"
+devices = {{ fisheye = {fisheye:?}, camera = {camera:?}, wheels = {wheels:?} }}
+[capacity]
+memory = "1.9GB"
+cpu = "400%"
+[mesh]
+unsealed = true
+fleet = "house-{first}"
+listen = "127.0.0.1:{port}"
+seeds = [{seeds}]
+gone_after = "4s"
+[radio]
+rssi = {{ file = {wireless:?} }}
+[sensors]
+battery = {{ file = {battery:?} }}
+[components]
+path = [{scripts:?}, {programs:?}]
+[ros]
+domain_id = {domain}
+[api]
+socket = {socket:?}
+[storage]
+state = {state:?}
+"#,
+            name = self.name,
+            fisheye = body.fisheye,
+            camera = body.camera,
+            wheels = body.wheels,
+            first = ports[0],
+            port = self.port,
+            seeds = seeds.join(", "),
+            wireless = body.wireless,
+            battery = body.battery,
+            scripts = self.scripts(),
+            programs = self.programs.folder(),
+            socket = self.socket(),
+            state = self.state(),
+        );
+        fs::create_dir_all(self.scripts()).expect("a folder");
+        fs::write(self.config(), text).expect("robot.toml is written");
+    }
+
+    /// Starts it; the operating system may still be busy with it when this returns.
+    pub fn start(&mut self) {
+        let log = fs::File::options().create(true).append(true).open(self.log());
+        let log = log.expect("a log");
+        let mut command = Command::new(self.programs.agent());
+        command.arg("--config").arg(self.config());
+        command.stdin(Stdio::null()).stdout(log.try_clone().expect("a log")).stderr(log);
+        self.process = Some(command.process_group(0).spawn().expect("the agent starts"));
+    }
+
+    /// `kill -9` of the agent alone.
+    pub fn kill(&mut self) {
+        let mut process = self.process.take().expect("the agent runs");
+        process.kill().expect("it can be killed");
+        process.wait().expect("it is ours");
+    }
+
+    /// Ends it in good order and waits for it.
+    pub fn stop(&mut self) {
+        let Some(mut process) = self.process.take() else { return };
+        let pid = Pid::from_child(&process);
+        // it may have ended by itself
+        let _ = kill_process(pid, Signal::TERM);
+        let ended = wait_for(LIMIT, || matches!(process.try_wait(), Ok(Some(_))));
+        if !ended {
+            let _ = process.kill();
+            let _ = process.wait();
+        }
+    }
+
+    /// The agent's process id.
+    pub fn pid(&self) -> u32 {
+        self.process.as_ref().expect("the agent runs").id()
+    }
+
+    /// Runs `sdr ARGUMENTS` against this agent.
+    pub fn sdr(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(self.programs.sdr());
+        command.arg("--agent").arg(self.socket()).args(arguments).env("NO_COLOR", "1");
+        command.output().expect("sdr runs")
+    }
+
+    /// What it believes; `None` while it does not answer.
+    pub fn status(&self) -> Option<StatusView> {
+        let output = self.sdr(&["status", "-o", "json"]);
+        serde_json::from_slice(&output.stdout).ok()
+    }
+
+    /// Its events of one kind.
+    pub fn events(&self, kind: &str) -> Vec<EventView> {
+        let output = self.sdr(&["events", "-o", "json"]);
+        let events: Vec<EventView> = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        events.into_iter().filter(|view| view.event.kind == kind).collect()
+    }
+
+    /// The process id of a component's newest instance here.
+    pub fn component_pid(&self, component: &str) -> Option<u32> {
+        let of = |view: &&EventView| {
+            view.event.component.as_ref().is_some_and(|name| name.as_str() == component)
+        };
+        let started = self.events("started");
+        let newest = started.iter().filter(of).next_back()?;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a pid")]
+        newest.event.numbers.get("pid").map(|pid| *pid as u32)
+    }
+
+    /// Puts an executable script where this robot looks for components.
+    pub fn install_script(&self, name: &str, text: &str) {
+        use std::os::unix::fs::PermissionsExt;
+        let path = self.scripts().join(name);
+        let mut file = fs::File::create(&path).expect("a script");
+        file.write_all(text.as_bytes()).expect("a script");
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("permissions");
+    }
+
+    /// Its API socket.
+    pub fn socket(&self) -> PathBuf {
+        self.folder.join("a.sock")
+    }
+
+    /// Its state folder.
+    pub fn state(&self) -> PathBuf {
+        self.folder.join("state")
+    }
+
+    /// Its log.
+    pub fn log(&self) -> PathBuf {
+        self.folder.join("agent.log")
+    }
+
+    fn config(&self) -> PathBuf {
+        self.folder.join("robot.toml")
+    }
+
+    fn scripts(&self) -> PathBuf {
+        self.folder.join("scripts")
+    }
+
+    pub(super) fn story(&self) -> String {
+        let log = fs::read_to_string(self.log()).unwrap_or_default();
+        let events = self.sdr(&["events"]);
+        let events = String::from_utf8_lossy(&events.stdout).into_owned();
+        format!("--- {} log\n{log}\n--- {} events\n{events}\n", self.name, self.name)
+    }
+}
+
+impl Drop for Agent {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// Whether a process of this id exists.
+pub fn is_running(pid: u32) -> bool {
+    let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
+    pid.is_some_and(|pid| test_kill_process(pid).is_ok())
+}
+
+/// Ends a process at once, as a crash would.
+pub fn kill(pid: u32) {
+    let pid = i32::try_from(pid).ok().and_then(Pid::from_raw).expect("a process id");
+    kill_process(pid, Signal::KILL).expect("the process is ours");
+}

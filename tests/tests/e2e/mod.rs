@@ -1,0 +1,5 @@
+//! Real agents and real processes, as a user runs them.
+
+mod by_hand;
+mod demo;
+mod garbage;
