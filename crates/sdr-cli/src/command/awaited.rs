@@ -8,8 +8,8 @@ use sdr_core::{
 use serde::Serialize;
 
 use crate::render::{
+    problems::{is_active, state_words},
     progress::Frame,
-    status::{is_active, state_words},
     units::{count, one_line},
 };
 

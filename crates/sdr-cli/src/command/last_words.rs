@@ -8,7 +8,7 @@ use super::awaited::Awaited;
 use crate::{
     client::Client,
     render::{
-        status::Placed,
+        problems::Placed,
         units::{one_line, shorten},
     },
 };

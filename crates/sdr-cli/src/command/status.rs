@@ -11,7 +11,7 @@ use crate::{
     client::Client,
     failure::Failure,
     output::Format,
-    render::{self, status::Problem},
+    render::{self, problems::Problem},
 };
 
 /// Arguments of `sdr status`.
@@ -31,7 +31,7 @@ struct StatusReport<'a> {
 pub(crate) async fn run(_args: StatusArgs, session: &Session) -> Result<ExitCode, Failure> {
     let client = Client::of(session)?;
     let view: StatusView = client.get("/v1/status").await?;
-    let mut problems = render::status::problems(&view);
+    let mut problems = render::problems::problems(&view);
     for problem in &mut problems {
         let Some(placed) = &problem.component else { continue };
         let last = last_words::of(placed, &view, &client).await;

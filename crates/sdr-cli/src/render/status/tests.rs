@@ -1,6 +1,6 @@
 //! Golden screens.
 
-use sdr_core::api::ConditionView;
+use sdr_core::{api::ConditionView, lifecycle::LifecycleState};
 
 use super::*;
 use crate::render::fixture;
