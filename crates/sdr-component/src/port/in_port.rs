@@ -16,7 +16,8 @@ use crate::{
 /// An input that carries messages of type `M`, from any number of connections.
 ///
 /// Samples wait here, at most the connection's depth of each; older ones make room. While the
-/// component is not active nothing waits.
+/// component is not active nothing waits. Belongs to the thread that runs the callbacks;
+/// another one may wait up to a beat for it.
 #[derive(Debug)]
 pub struct InPort<M: Message> {
     core: SharedInput,

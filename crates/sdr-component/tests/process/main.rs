@@ -268,3 +268,27 @@ fn a_component_may_end_itself() {
     line.until_state(LifecycleState::Finalized);
     assert!(process.wait().success());
 }
+
+#[test]
+fn a_component_that_is_killed_again_and_again_finds_its_ports_free() {
+    let agent = Agent::new();
+    let memory = Memory::open(&agent.memory, "test").unwrap();
+    let source = memory.publisher("test/source/number", 8, 64).unwrap();
+    let doubles = memory.subscriber("test/doubler/double", 8).unwrap();
+
+    // More often than a port has places for writers.
+    for run in 1..=6 {
+        let (process, mut line) = agent.prepare(None, ExecutionSetup::OnData);
+        line.order(Order::Activate { token: token(1, run) });
+        line.until_state(LifecycleState::Active);
+        send(&source, &token(1, 1), u64::from(run), 5);
+        line.until(|word| match word {
+            FromComponent::Counters(counters) => (counters.outputs[0].sent == 1).then_some(()),
+            _ => None,
+        });
+        let double = doubles.receive().unwrap().unwrap();
+        assert_eq!(double.header().run, run);
+        // Dropping it kills it, without any farewell.
+        drop(process);
+    }
+}
