@@ -41,7 +41,7 @@ pub(crate) async fn run(_args: StatusArgs, session: &Session) -> Result<ExitCode
     match session.output.format() {
         Format::Text => {
             let (columns, _) = session.output.size();
-            for line in render::status::screen_with(&view, &problems, columns) {
+            for line in render::status::screen(&view, &problems, columns) {
                 session.output.line(&line)?;
             }
         }

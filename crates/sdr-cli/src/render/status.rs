@@ -3,20 +3,15 @@
 use sdr_core::api::{ComponentView, RobotView, StatusView, SystemView};
 
 use super::{
-    problems::{Problem, problems},
+    problems::Problem,
     table::Table,
     units::{NOTHING, count, level, megabytes, one_line, percent, span, wrap},
 };
 
-pub(crate) use super::problems::is_active;
+pub(crate) use super::problems::{is_active, problems};
 
-/// The whole screen.
-pub(crate) fn screen(view: &StatusView, columns: usize) -> Vec<String> {
-    screen_with(view, &problems(view), columns)
-}
-
-/// The whole screen, when more was learnt of its problems.
-pub(crate) fn screen_with(view: &StatusView, problems: &[Problem], columns: usize) -> Vec<String> {
+/// The whole screen: `problems` of the view, to which more may have been learnt, stand first.
+pub(crate) fn screen(view: &StatusView, problems: &[Problem], columns: usize) -> Vec<String> {
     let mut lines = Vec::new();
     for problem in problems {
         lines.extend(wrap(&format!("! {}", problem.text), columns, "  "));

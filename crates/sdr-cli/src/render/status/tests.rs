@@ -6,7 +6,7 @@ use super::*;
 use crate::render::fixture;
 
 fn text(view: &StatusView) -> String {
-    let lines = screen(view, 80);
+    let lines = screen(view, &problems(view), 80);
     for line in &lines {
         assert!(line.chars().count() <= 80, "{} columns: {line}", line.chars().count());
     }
