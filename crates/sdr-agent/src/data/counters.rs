@@ -18,6 +18,13 @@ macro_rules! counters {
             $($(#[$doc])* pub(crate) $name: u64,)*
         }
 
+        impl RouteCounters {
+            /// All of them with their names.
+            pub(crate) fn named(&self) -> impl Iterator<Item = (&'static str, u64)> {
+                [$((stringify!($name), self.$name),)*].into_iter()
+            }
+        }
+
         /// The same, while they grow.
         #[derive(Debug, Default)]
         pub(super) struct Counts {

@@ -1,5 +1,8 @@
 //! DDS as the transport between robots: one participant a robot, raw CDR bodies.
 
+mod matching;
+mod raw;
+
 use std::{
     cell::RefCell,
     collections::BTreeMap,
@@ -21,11 +24,12 @@ use rustdds::{
 };
 use sdr_core::spec::{Qos, Reliability};
 
+use matching::Matching;
+use raw::{CopyInto, Raw};
+
 use super::{
     bell::Bell,
-    matching::Matching,
     origin::{Identity, Origin, TRAILER_BYTES},
-    raw::{CopyInto, Raw},
     transport::{Arrival, EndpointId, Matched, SendError, Topic, Transport, TransportError, Way},
 };
 
@@ -354,5 +358,4 @@ fn type_name(message_type: &str) -> String {
 }
 
 #[cfg(test)]
-#[path = "dds_tests.rs"]
 mod tests;

@@ -19,10 +19,8 @@ mod counters;
 mod dds;
 mod desk;
 mod in_route;
-mod matching;
 mod origin;
 mod out_route;
-mod raw;
 mod tap;
 mod transport;
 
@@ -127,11 +125,17 @@ impl Data {
     }
 
     /// Ends the bridge and leaves the network; waits for it, some tens of milliseconds.
-    pub(crate) fn stop(mut self) {
-        self.end();
+    pub(crate) fn stop(self) {
+        drop(self);
     }
+}
 
-    fn end(&mut self) {
+impl Drop for Data {
+    fn drop(&mut self) {
+        for (path, way, counters) in self.counters() {
+            let counts: Vec<_> = counters.named().filter(|(_, count)| *count > 0).collect();
+            tracing::debug!(event = "route-ended", path, ?way, ?counts);
+        }
         self.desk.put(|wanted| wanted.stop = true);
         self.bell.ring();
         if let Some(thread) = self.thread.take()
@@ -139,12 +143,6 @@ impl Data {
         {
             tracing::error!(event = "data-plane-died", "the bridge's thread had panicked");
         }
-    }
-}
-
-impl Drop for Data {
-    fn drop(&mut self) {
-        self.end();
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rustdds::{DomainParticipantStatusEvent, GUID};
 
-use super::transport::{EndpointId, Matched};
+use crate::data::transport::{EndpointId, Matched};
 
 /// The remote endpoints of each of ours.
 pub(super) struct Matching {
