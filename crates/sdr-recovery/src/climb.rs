@@ -39,6 +39,8 @@ pub(crate) struct Trouble {
 #[derive(Clone, Debug)]
 pub(crate) struct Climb {
     pub(crate) trouble: Trouble,
+    /// The robot is ill and nobody takes the component: it is helped here meanwhile.
+    meanwhile: bool,
     /// The rung it stands on; never goes down.
     rung: usize,
     /// Orders given on this rung.
@@ -53,7 +55,7 @@ enum Phase {
     /// The next order should be given.
     Due { since: Instant },
     /// An order is out; its answer has not come.
-    Ordered { answer_until: Option<Instant>, after: Duration },
+    Ordered { answer_until: Option<Instant>, not_before: Instant },
     /// It was done; the fault must stay away. `calm` once the condition was over.
     Settling { until: Instant, calm: bool },
     /// It was refused; the same rung is asked again.
@@ -114,7 +116,17 @@ pub(crate) enum Order {
 impl Climb {
     pub(crate) fn new(now: Instant, trouble: Trouble) -> Self {
         let phase = Phase::Due { since: now };
-        Self { trouble, rung: 0, tried: 0, refused: 0, phase }
+        Self { trouble, meanwhile: false, rung: 0, tried: 0, refused: 0, phase }
+    }
+
+    /// A climb for `trouble` here, while nobody takes the component off an ill robot.
+    pub(crate) fn meanwhile(now: Instant, trouble: Trouble) -> Self {
+        Self { meanwhile: true, ..Self::new(now, trouble) }
+    }
+
+    /// Whether another cause, of the robot or not, has to wait until this climb is over.
+    pub(crate) fn makes_wait(&self, rule: usize, of_robot: bool) -> bool {
+        rule == self.trouble.rule || (self.meanwhile && of_robot)
     }
 
     /// Learns what came of the order; `true` when it was a move that was done.
@@ -124,7 +136,7 @@ impl Climb {
         outcome: RemedyOutcome,
         (ladder, limits, patient): (&Ladder, &Limits, bool),
     ) -> bool {
-        let Phase::Ordered { .. } = self.phase else {
+        let Phase::Ordered { not_before, .. } = self.phase else {
             return false;
         };
         let rung = ladder.rungs()[self.rung];
@@ -137,7 +149,9 @@ impl Climb {
                     | Rung::LaunchElsewhere
                     | Rung::Hold => limits.settle,
                 };
-                self.phase = Phase::Settling { until: now + settle, calm: false };
+                // A restart that is only planned yet has not had its time to help.
+                let until = now.max(not_before) + settle;
+                self.phase = Phase::Settling { until, calm: false };
                 leaves(rung)
             }
             RemedyOutcome::Refused => {
@@ -158,16 +172,18 @@ impl Climb {
     pub(crate) fn look(&mut self, now: Instant, signs: Signs, ladder: &Ladder) -> Look {
         let away = leaves(ladder.rungs()[self.rung]);
         match self.phase {
+            Phase::Due { .. } if signs.gone() => Look::Over,
             Phase::Due { .. } => Look::Step,
             Phase::Ordered { .. } | Phase::Pausing { .. } if away && signs.gone() => Look::Over,
             Phase::Pausing { until } if now >= until => Look::Step,
             Phase::Pausing { .. } => Look::Wait,
             Phase::Ordered { .. } if away => Look::Wait,
-            Phase::Ordered { answer_until, after } => {
+            Phase::Ordered { answer_until, not_before } => {
                 // Ending the process looks like a fault too, so it counts only when no
                 // answer follows.
-                let noted = answer_until.or(signs.fault.then(|| now + after + ANSWER_MAX));
-                self.phase = Phase::Ordered { answer_until: noted, after };
+                let latest = now.max(not_before) + ANSWER_MAX;
+                let noted = answer_until.or(signs.fault.then_some(latest));
+                self.phase = Phase::Ordered { answer_until: noted, not_before };
                 if noted.is_some_and(|until| now >= until) { Look::Step } else { Look::Wait }
             }
             Phase::Settling { until, calm } => self.look_settling(now, signs, (until, calm, away)),
@@ -233,8 +249,11 @@ impl Climb {
         (until, calm, away): (Instant, bool, bool),
     ) -> Look {
         // What happens to the instance that was left behind is no sign of the new one.
-        let recurs = !away && (signs.fault || (calm && signs.raised()));
-        if recurs {
+        if !away && signs.fault {
+            // Where the condition is over, a fault is a matter of its own.
+            return if signs.gone() { Look::Over } else { Look::Step };
+        }
+        if !away && calm && signs.raised() {
             return Look::Step;
         }
         self.phase = Phase::Settling { until, calm: calm || signs.gone() };
@@ -288,7 +307,7 @@ impl Climb {
             way.restarts.spend(now, way.limits.restarts_per_hour);
         }
         self.tried = self.tried.saturating_add(1);
-        self.phase = Phase::Ordered { answer_until: None, after };
+        self.phase = Phase::Ordered { answer_until: None, not_before: now + after };
         Order::Try(remedy, note)
     }
 

@@ -83,44 +83,36 @@ impl Engine {
         }
     }
 
-    /// For causes of the robot that are first met here, one component after the other: whose
-    /// turn it is, by rule. The largest begins, for it frees most.
-    fn turns(&self, evidence: &[Evidence]) -> BTreeMap<usize, ComponentKey> {
-        let mut turns = BTreeMap::new();
-        for (index, sustain) in &self.robot {
-            let rule = &self.policy.parts().rules[*index];
-            if !sustain.raised() || !self.is_one_by_one(rule) {
-                continue;
-            }
-            let watch = |one: &Evidence| self.watches.get(&one.component);
-            let climbs = |one: &&Evidence| {
-                let climb = watch(one).and_then(|watch| watch.climb.as_ref());
-                climb.is_some_and(|climb| climb.trouble.rule == *index)
-            };
-            let free = |one: &&Evidence| {
-                watch(one).is_some_and(|watch| {
-                    watch.climb.is_none() && !watch.is_latched() && !watch.held.contains_key(index)
-                })
-            };
-            let size = |one: &Evidence| match sustain.condition().fact {
-                Fact::RobotCpu => u64::from(one.cpu.0),
-                Fact::RobotMemoryFree
-                | Fact::RobotBattery
-                | Fact::RobotRssi
-                | Fact::ComponentCpuOfLimit
-                | Fact::ComponentCpuOfCore
-                | Fact::LinksDelay
-                | Fact::LinksJitter
-                | Fact::LinksLoss => one.memory.0,
-            };
-            let here = || evidence.iter().filter(|one| !is_gone(one));
-            let largest =
-                || here().filter(free).min_by_key(|one| (u64::MAX - size(one), &one.component));
-            if let Some(next) = here().find(climbs).or_else(largest) {
-                turns.insert(*index, next.component.clone());
-            }
+    /// Whose turn it is for a raised cause of the robot that is first met here, one component
+    /// after the other: the largest that nothing else is done for. Nobody's while one climbs.
+    fn turn<'a>(&self, rule: usize, evidence: &'a [Evidence]) -> Option<&'a Evidence> {
+        let sustain = self.robot.get(&rule).filter(|sustain| sustain.raised())?;
+        if !self.is_one_by_one(&self.policy.parts().rules[rule]) {
+            return None;
         }
-        turns
+        let watch = |one: &Evidence| self.watches.get(&one.component);
+        let climbs = |one: &Evidence| {
+            let climb = watch(one).and_then(|watch| watch.climb.as_ref());
+            climb.is_some_and(|climb| climb.trouble.rule == rule)
+        };
+        let free = |one: &&Evidence| {
+            watch(one).is_some_and(|watch| watch.is_free_for(rule)) && !is_gone(one)
+        };
+        let size = |one: &Evidence| match sustain.condition().fact {
+            Fact::RobotCpu => u64::from(one.cpu.0),
+            Fact::RobotMemoryFree
+            | Fact::RobotBattery
+            | Fact::RobotRssi
+            | Fact::ComponentCpuOfLimit
+            | Fact::ComponentCpuOfCore
+            | Fact::LinksDelay
+            | Fact::LinksJitter
+            | Fact::LinksLoss => one.memory.0,
+        };
+        if evidence.iter().any(climbs) {
+            return None;
+        }
+        evidence.iter().filter(free).min_by_key(|one| (u64::MAX - size(one), &one.component))
     }
 
     /// A cause of the robot whose ladder begins here: freeing one component may be enough.
@@ -131,53 +123,60 @@ impl Engine {
         }
     }
 
-    /// Causes that stand for a component now.
-    fn troubles(
-        &self,
-        now: Instant,
-        one: &Evidence,
-        turns: &BTreeMap<usize, ComponentKey>,
-    ) -> Vec<Trouble> {
-        let Some(watch) = self.watches.get(&one.component) else {
-            return Vec::new();
-        };
+    /// Causes that stand for a component now, but those that go by turns.
+    fn troubles(&self, now: Instant, one: &Evidence) -> Vec<Trouble> {
         let trouble = |(index, rule): (usize, &Rule)| match rule.trigger {
             Trigger::Fault => {
                 let fault = one.fault.as_ref().filter(|fault| fault.cause == rule.cause)?;
                 let reason = fault_reason(fault);
                 Some(Trouble { rule: index, since: now, held_over_at: now, reason })
             }
-            Trigger::Condition(condition) => {
-                let seen = sustain(&watch.own, &self.robot, index)?;
-                let known = !is_gone(one) && condition.fact.read(one).is_some();
-                let turn = !self.robot.contains_key(&index)
-                    || !self.is_one_by_one(rule)
-                    || turns.get(&index) == Some(&one.component);
-                let held_over_at = seen.held_over_at().filter(|_| known && turn)?;
-                let since = held_over_at - condition.hold;
-                let reason = condition_reason(seen, now);
-                Some(Trouble { rule: index, since, held_over_at, reason })
+            Trigger::Condition(_) => {
+                let by_turns = self.robot.contains_key(&index) && self.is_one_by_one(rule);
+                if by_turns { None } else { self.condition_trouble(now, one, index) }
             }
         };
         self.policy.parts().rules.iter().enumerate().filter_map(trouble).collect()
+    }
+
+    /// The condition of a rule, when it is raised and its figure is known for the component.
+    fn condition_trouble(&self, now: Instant, one: &Evidence, rule: usize) -> Option<Trouble> {
+        let seen = sustain(&self.watches.get(&one.component)?.own, &self.robot, rule)?;
+        let condition = seen.condition();
+        let known = !is_gone(one) && condition.fact.read(one).is_some();
+        let held_over_at = seen.held_over_at().filter(|_| known)?;
+        let since = held_over_at - condition.hold;
+        Some(Trouble { rule, since, held_over_at, reason: condition_reason(seen, now) })
+    }
+
+    fn judge_one(&mut self, now: Instant, one: &Evidence, troubles: Vec<Trouble>) -> Vec<Verdict> {
+        let Some(watch) = self.watches.get_mut(&one.component) else {
+            return Vec::new();
+        };
+        let moves = self.moves.entry(one.component.clone()).or_default();
+        let (policy, robot) = (&self.policy, &self.robot);
+        watch.judge(&mut Scene { now, policy, robot, evidence: one, moves }, troubles)
     }
 }
 
 impl Recovery for Engine {
     fn judge(&mut self, now: Instant, evidence: &[Evidence]) -> Vec<Verdict> {
         self.judged_at = now;
+        if evidence.is_empty() {
+            // Nobody tells how the robot is, so nothing is known of the time until somebody does.
+            self.robot.clear();
+        }
         self.feed(now, evidence);
-        let turns = self.turns(evidence);
         let mut verdicts = Vec::new();
         for one in evidence {
-            let troubles = self.troubles(now, one, &turns);
-            let Some(watch) = self.watches.get_mut(&one.component) else {
-                continue;
-            };
-            let moves = self.moves.entry(one.component.clone()).or_default();
-            let mut scene =
-                Scene { now, policy: &self.policy, robot: &self.robot, evidence: one, moves };
-            verdicts.extend(watch.judge(&mut scene, troubles));
+            let troubles = self.troubles(now, one);
+            verdicts.extend(self.judge_one(now, one, troubles));
+        }
+        for rule in 0..self.policy.parts().rules.len() {
+            if let Some(one) = self.turn(rule, evidence) {
+                let troubles = self.condition_trouble(now, one, rule).into_iter().collect();
+                verdicts.extend(self.judge_one(now, one, troubles));
+            }
         }
         self.moves.retain(|_, moves| !moves.is_idle(now));
         verdicts
@@ -213,7 +212,6 @@ impl Recovery for Engine {
             }
         }
         if self.watches.is_empty() {
-            // Nobody looks from now on, so nothing is known of the time until somebody does.
             self.robot.clear();
         }
     }
@@ -225,6 +223,7 @@ impl Recovery for Engine {
             deadline.filter(|at| watch.seen_at == self.judged_at || *at > self.judged_at)
         };
         let robot = self.robot.values().filter_map(|sustain| sustain.deadline(self.judged_at));
+        let robot = robot.filter(|at| *at > self.judged_at);
         robot.chain(self.watches.values().filter_map(due)).min()
     }
 

@@ -66,39 +66,35 @@ impl Smoother {
         }
     }
 
-    /// When [`Self::mostly`] becomes true if the newest value, which meets `test`, stays.
-    pub(crate) fn mostly_at(&self, now: Instant, test: impl Fn(i64) -> bool) -> Option<Instant> {
-        if !self.newest().is_some_and(&test) {
-            return None;
-        }
+    /// When [`Self::mostly`] changes its answer if the newest value stays.
+    pub(crate) fn flips_at(&self, now: Instant, test: impl Fn(i64) -> bool) -> Option<Instant> {
+        let holds = self.mostly(now, &test);
         let mut lead = self.lead(now, &test)?;
-        if lead >= 0 {
-            return Some(now);
-        }
+        let sign = |value: Option<i64>| -> i128 {
+            match value.map(&test) {
+                Some(true) => 1,
+                Some(false) => -1,
+                None => 0,
+            }
+        };
+        let comes = sign(self.newest());
+        let fills = (self.samples.front()?.0 + self.window).since(now);
+        let spans = self.spans(now).into_iter().map(|span| (span.lasts, sign(span.value)));
         let mut at = now;
-        // The window's far edge moves over the spans, one after the other.
-        let full_at = self.samples.front()?.0 + self.window;
-        if full_at > at {
-            let fills = i128::try_from(full_at.since(at).as_nanos()).unwrap_or(i128::MAX);
-            if lead + fills >= 0 {
-                return Some(later(at, -lead));
-            }
-            (lead, at) = (lead + fills, full_at);
-        }
-        for span in self.spans(now) {
-            let lasts = i128::try_from(span.lasts.as_nanos()).unwrap_or(i128::MAX);
-            // One more nanosecond that meets the test comes in; what goes out decides.
-            let gain = match span.value.map(&test) {
-                Some(true) => 0,
-                None => 1,
-                Some(false) => 2,
+        // Once the window is full its far edge moves over the spans, one after the other.
+        for (lasts, goes) in core::iter::once((fills, 0)).chain(spans) {
+            let (nanos, slope) = (nanos(lasts), comes - goes);
+            let after = match slope.signum() {
+                1 if !holds => (-lead + slope - 1) / slope,
+                -1 if holds => lead / -slope + 1,
+                _ => i128::MAX,
             };
-            if gain > 0 && lead + gain * lasts >= 0 {
-                return Some(later(at, (-lead + gain - 1) / gain));
+            if after <= nanos {
+                return Some(at + Duration::from_nanos(u64::try_from(after).unwrap_or(u64::MAX)));
             }
-            (lead, at) = (lead + gain * lasts, at + span.lasts);
+            (lead, at) = (lead + slope * nanos, at + lasts);
         }
-        Some(at)
+        (holds && self.newest().is_none()).then_some(at)
     }
 
     fn newest(&self) -> Option<i64> {
@@ -110,7 +106,7 @@ impl Smoother {
     fn lead(&self, now: Instant, test: &impl Fn(i64) -> bool) -> Option<i128> {
         let mut lead = None;
         for span in self.spans(now) {
-            let lasts = i128::try_from(span.lasts.as_nanos()).unwrap_or(i128::MAX);
+            let lasts = nanos(span.lasts);
             if let Some(value) = span.value.filter(|_| lasts > 0) {
                 let signed = if test(value) { lasts } else { -lasts };
                 lead = Some(lead.unwrap_or(0) + signed);
@@ -136,8 +132,8 @@ struct Span {
     lasts: Duration,
 }
 
-fn later(at: Instant, nanos: i128) -> Instant {
-    at + Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+fn nanos(time: Duration) -> i128 {
+    i128::try_from(time.as_nanos()).unwrap_or(i128::MAX)
 }
 
 #[cfg(test)]
@@ -166,8 +162,8 @@ mod tests {
         let smoother = fed(&[(0, Some(-470)), (5_000, Some(-550))]);
 
         assert!(!smoother.mostly(at(5_499), bad));
-        assert_eq!(smoother.mostly_at(at(5_000), bad), Some(at(5_500)));
-        assert_eq!(smoother.mostly_at(at(5_300), bad), Some(at(5_500)));
+        assert_eq!(smoother.flips_at(at(5_000), bad), Some(at(5_500)));
+        assert_eq!(smoother.flips_at(at(5_300), bad), Some(at(5_500)));
         assert!(smoother.mostly(at(5_500), bad));
         assert_eq!(smoother.median(at(5_499)), Some(-470));
         assert_eq!(smoother.median(at(5_500)), Some(-550));
@@ -180,14 +176,14 @@ mod tests {
             often.feed(at(millis), Some(-550));
         }
         assert!(!often.mostly(at(5_490), bad));
-        assert_eq!(often.mostly_at(at(5_490), bad), Some(at(5_500)));
+        assert_eq!(often.flips_at(at(5_490), bad), Some(at(5_500)));
     }
 
     #[test]
     fn an_outlier_changes_nothing() {
         let smoother = fed(&[(0, Some(-470)), (5_000, Some(-900)), (5_200, Some(-470))]);
         assert!(!smoother.mostly(at(5_600), bad));
-        assert_eq!(smoother.mostly_at(at(5_600), bad), None);
+        assert_eq!(smoother.flips_at(at(5_600), bad), None);
     }
 
     #[test]
@@ -197,7 +193,7 @@ mod tests {
 
         let gap = fed(&[(0, Some(-470)), (5_000, None), (5_800, Some(-550))]);
         assert!(!gap.mostly(at(5_850), bad));
-        assert_eq!(gap.mostly_at(at(5_850), bad), Some(at(5_900)));
+        assert_eq!(gap.flips_at(at(5_850), bad), Some(at(5_900)));
         assert!(gap.mostly(at(5_900), bad));
 
         assert!(!fed(&[(0, None)]).mostly(at(500), bad));
@@ -213,7 +209,7 @@ mod tests {
         ];
         for pattern in patterns {
             let smoother = fed(pattern);
-            let told = smoother.mostly_at(at(900), bad).unwrap();
+            let told = smoother.flips_at(at(900), bad).unwrap();
             assert!(smoother.mostly(told, bad), "{pattern:?}");
             assert!(!smoother.mostly(told - Duration::from_nanos(1), bad), "{pattern:?}");
         }

@@ -45,38 +45,26 @@ impl Sustain {
     /// Takes a fresh figure; `None` when nobody can tell.
     pub(crate) fn feed(&mut self, now: Instant, found: Option<Level>) {
         self.smoother.feed(now, found.map(Level::raw));
-        self.stage = match self.stage {
-            Stage::Calm | Stage::Pending { .. } if !self.bar_holds(now) => Stage::Calm,
-            Stage::Calm => self.held(now, now),
-            Stage::Pending { since } => self.held(now, since),
-            Stage::Raised { since, clearing } => match self.clear_hold(now) {
-                None => Stage::Raised { since, clearing: None },
-                Some(hold) => {
-                    let clear_since = clearing.unwrap_or(now);
-                    if now.since(clear_since) >= hold {
-                        Stage::Calm
-                    } else {
-                        Stage::Raised { since, clearing: Some(clear_since) }
-                    }
-                }
-            },
-        };
+        let before = self.stage;
+        self.stage = self.next_stage(now);
+        if core::mem::discriminant(&before) != core::mem::discriminant(&self.stage) {
+            // In the moment of change the next stage may begin to end already.
+            self.stage = self.next_stage(now);
+        }
     }
 
     /// When it should be fed again at the latest, if the figure stays as it is.
     pub(crate) fn deadline(&self, now: Instant) -> Option<Instant> {
         let bar = self.condition.bar;
+        let bar_flips = || self.smoother.flips_at(now, |found| bar.holds(found));
         match (self.stage, self.condition.clear) {
-            (Stage::Calm, _) => self.smoother.mostly_at(now, |found| bar.holds(found)),
-            (Stage::Pending { since }, _) => Some(since + self.condition.hold),
-            (Stage::Raised { clearing: Some(since), .. }, clear) => {
-                Some(since + clear.map_or(Duration::ZERO, |clear| clear.hold))
+            (Stage::Calm, _) | (Stage::Raised { .. }, None) => bar_flips(),
+            (Stage::Pending { since }, _) => {
+                Some(since + self.condition.hold).into_iter().chain(bar_flips()).min()
             }
-            (Stage::Raised { clearing: None, .. }, Some(Clear { level, .. })) => {
-                self.smoother.mostly_at(now, |found| bar.released(level, found))
-            }
-            (Stage::Raised { clearing: None, .. }, None) => {
-                self.smoother.mostly_at(now, |found| !bar.holds(found))
+            (Stage::Raised { clearing, .. }, Some(Clear { level, hold })) => {
+                let flips = self.smoother.flips_at(now, |found| bar.released(level, found));
+                clearing.map(|since| since + hold).into_iter().chain(flips).min()
             }
         }
     }
@@ -97,6 +85,14 @@ impl Sustain {
         }
     }
 
+    /// When it will have held for its whole time, while it is pending.
+    pub(crate) fn raised_at(&self) -> Option<Instant> {
+        match self.stage {
+            Stage::Pending { since } => Some(since + self.condition.hold),
+            Stage::Calm | Stage::Raised { .. } => None,
+        }
+    }
+
     /// The figure as it is judged.
     pub(crate) fn found(&self, now: Instant) -> Option<Level> {
         let raw = self.smoother.median(now)?;
@@ -105,6 +101,25 @@ impl Sustain {
 
     pub(crate) fn condition(&self) -> &Condition {
         &self.condition
+    }
+
+    fn next_stage(&self, now: Instant) -> Stage {
+        match self.stage {
+            Stage::Calm | Stage::Pending { .. } if !self.bar_holds(now) => Stage::Calm,
+            Stage::Calm => self.held(now, now),
+            Stage::Pending { since } => self.held(now, since),
+            Stage::Raised { since, clearing } => match self.clear_hold(now) {
+                None => Stage::Raised { since, clearing: None },
+                Some(hold) => {
+                    let clear_since = clearing.unwrap_or(now);
+                    if now.since(clear_since) >= hold {
+                        Stage::Calm
+                    } else {
+                        Stage::Raised { since, clearing: Some(clear_since) }
+                    }
+                }
+            },
+        }
     }
 
     fn bar_holds(&self, now: Instant) -> bool {

@@ -1,6 +1,7 @@
 //! One component: the conditions of its own, the climb it is on, and what it is held for.
 
 use alloc::{collections::BTreeMap, string::String, vec::Vec};
+use core::time::Duration;
 
 use sdr_core::{
     recover::{Cause, Evidence, Remedy, Verdict},
@@ -16,6 +17,10 @@ use crate::{
     sustain::{Stage, Sustain},
 };
 
+/// How long a component that failed while it was to leave may wait for its new home before it
+/// is started here again.
+const MOVE_MAX: Duration = Duration::from_secs(5);
+
 /// What is remembered of one component.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
@@ -23,8 +28,9 @@ pub(crate) struct Watch {
     pub(crate) own: BTreeMap<usize, Sustain>,
     pub(crate) climb: Option<Climb>,
     pub(crate) held: BTreeMap<usize, Held>,
-    /// A fault that came while a move was under way; due when the move comes to nothing.
-    pub(crate) missed: Option<Trouble>,
+    /// A fault that came while a move was under way, and when it is dealt with here if the
+    /// move comes to nothing.
+    pub(crate) missed: Option<(Instant, Trouble)>,
     /// Restarts and local switches.
     pub(crate) restarts: Budget,
     /// When there was evidence of it last.
@@ -55,14 +61,28 @@ pub(crate) struct Scene<'a> {
 }
 
 impl Watch {
-    /// Says what should be done now about `troubles`, if anything.
+    /// Says what should be done now about `troubles`: one order, after the causes that it is
+    /// held for from now on.
     pub(crate) fn judge(
         &mut self,
         scene: &mut Scene<'_>,
         mut troubles: Vec<Trouble>,
-    ) -> Option<Verdict> {
-        let now = scene.now;
+    ) -> Vec<Verdict> {
         troubles.extend(self.leave_holds(scene));
+        let mut verdicts = Vec::new();
+        // Each hold takes one cause away, so this ends.
+        while let Some(verdict) = self.judge_once(scene, troubles.clone()) {
+            let held = verdict.remedy == Remedy::Hold;
+            verdicts.push(verdict);
+            if !held {
+                break;
+            }
+        }
+        verdicts
+    }
+
+    fn judge_once(&mut self, scene: &mut Scene<'_>, mut troubles: Vec<Trouble>) -> Option<Verdict> {
+        let now = scene.now;
         if self.is_latched() {
             return None;
         }
@@ -76,24 +96,37 @@ impl Watch {
         };
         let ladder = scene.policy.ladder(&rules(scene.policy)[climb.trouble.rule], self.actuator);
         if let Some(worse) = winner.clone().filter(|worse| {
-            worse.rule != climb.trouble.rule && first(worse.rule) > climb.severity(ladder)
+            let of_robot = is_of_robot(&rules(scene.policy)[worse.rule]);
+            !climb.makes_wait(worse.rule, of_robot) && first(worse.rule) > climb.severity(ladder)
         }) {
             return self.start(scene, worse);
         }
-        if climb.is_leaving(ladder) || climb.is_pausing() {
-            self.missed =
-                fault.filter(|fault| fault.rule != climb.trouble.rule).or(self.missed.take());
+        let (leaving, pausing) = (climb.is_leaving(ladder), climb.is_pausing());
+        let fault = fault.filter(|fault| fault.rule != climb.trouble.rule);
+        if let Some(fault) = fault.clone()
+            && is_of_robot(&rules(scene.policy)[climb.trouble.rule])
+            && (leaving || pausing)
+            && self.missed.is_none()
+        {
+            self.missed = Some((now + MOVE_MAX, fault));
         }
-        if climb.is_pausing()
-            && let Some(missed) = self.missed.take()
+        if let Some((_, fault)) =
+            self.missed.take_if(|(due, _)| pausing || (leaving && now >= *due))
         {
             // It stays here for now, so it should at least run here.
-            return self.start(scene, missed);
+            self.climb = Some(Climb::meanwhile(now, fault));
+            return self.step(scene);
         }
         let signs = signs(&self.own, scene, climb.trouble.rule);
         match climb.look(now, signs, ladder) {
             Look::Wait => None,
-            Look::Step => self.step(scene),
+            Look::Step => {
+                if let Some(fault) = fault.filter(|_| signs.condition.is_some()) {
+                    // Should the next rung be a move that comes to nothing.
+                    self.missed = Some((now + MOVE_MAX, fault));
+                }
+                self.step(scene)
+            }
             Look::Over => {
                 self.climb = None;
                 self.start_with(scene, winner)
@@ -102,7 +135,7 @@ impl Watch {
     }
 
     fn start_with(&mut self, scene: &mut Scene<'_>, winner: Option<Trouble>) -> Option<Verdict> {
-        let next = winner.or_else(|| self.missed.take())?;
+        let next = winner.or_else(|| self.missed.take().map(|(_, fault)| fault))?;
         self.start(scene, next)
     }
 
@@ -116,12 +149,18 @@ impl Watch {
         self.held.values().any(|held| held.latched)
     }
 
+    /// Whether nothing is done for it, and the cause of `rule` is not given up.
+    pub(crate) fn is_free_for(&self, rule: usize) -> bool {
+        self.climb.is_none() && !self.is_latched() && !self.held.contains_key(&rule)
+    }
+
     /// When it should be judged again at the latest.
     pub(crate) fn deadline(&self, now: Instant) -> Option<Instant> {
         let own = self.own.values().filter_map(|sustain| sustain.deadline(now));
         let climb = self.climb.as_ref().and_then(Climb::deadline);
         let held = self.held.values().filter_map(|held| held.until);
-        own.chain(climb).chain(held).min()
+        let missed = self.missed.as_ref().map(|(due, _)| *due).filter(|due| *due > now);
+        own.chain(climb).chain(held).chain(missed).min()
     }
 
     /// Ends the holds that are over, and gives back the troubles that are to be tried again.
@@ -171,7 +210,16 @@ impl Watch {
         );
         let (cause, held_over_at) = (rule.cause, climb.trouble.held_over_at);
         let (remedy, note) = match order {
-            Order::Try(remedy, note) => (remedy, note),
+            Order::Try(remedy, note) => {
+                self.missed = match remedy {
+                    // Either way it is started anew.
+                    Remedy::LocalStandby | Remedy::Restart { .. } => None,
+                    Remedy::StandbyElsewhere | Remedy::LaunchElsewhere | Remedy::Hold => {
+                        self.missed.take().map(|(_, fault)| (scene.now + MOVE_MAX, fault))
+                    }
+                };
+                (remedy, note)
+            }
             Order::Hold { note, until } => {
                 let latched = ladder.rungs().first() == Some(&Rung::Hold);
                 let trouble = self.climb.take()?.trouble;
@@ -202,7 +250,7 @@ pub(crate) fn condition_reason(sustain: &Sustain, now: Instant) -> String {
         Some(found) => alloc::format!("{found}"),
         None => String::from("unknown"),
     };
-    let tenths = |time: core::time::Duration| {
+    let tenths = |time: Duration| {
         let tenths = time.as_millis() / 100;
         alloc::format!("{}.{}", tenths / 10, tenths % 10)
     };
@@ -245,11 +293,10 @@ pub(crate) fn sustain<'a>(
 
 fn signs(own: &BTreeMap<usize, Sustain>, scene: &Scene<'_>, rule: usize) -> Signs {
     let condition = sustain(own, scene.robot, rule);
-    let pending = condition.filter(|sustain| matches!(sustain.stage(), Stage::Pending { .. }));
     Signs {
         fault: scene.evidence.fault.is_some(),
         condition: condition.map(Sustain::stage),
-        raised_at: pending.and_then(|sustain| sustain.deadline(scene.now)),
+        raised_at: condition.and_then(Sustain::raised_at),
     }
 }
 
