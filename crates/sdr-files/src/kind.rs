@@ -42,7 +42,7 @@ pub enum LoadedFile {
     /// A system.
     System(Box<LoadedSystem>),
     /// An allocation policy.
-    Allocation(sdr_alloc::Policy),
+    Allocation(Box<sdr_alloc::Policy>),
     /// A recovery policy.
     Recovery(sdr_recovery::Policy),
 }
@@ -97,7 +97,9 @@ pub fn load_any(path: &Path) -> Result<LoadedFile, Problems> {
     match detect(path)? {
         FileKind::Robot => load_robot(path).map(|robot| LoadedFile::Robot(Box::new(robot))),
         FileKind::System => load_system(path).map(|system| LoadedFile::System(Box::new(system))),
-        FileKind::Allocation => load_allocation(path).map(LoadedFile::Allocation),
+        FileKind::Allocation => {
+            load_allocation(path).map(|policy| LoadedFile::Allocation(Box::new(policy)))
+        }
         FileKind::Recovery => load_recovery(path).map(LoadedFile::Recovery),
     }
 }

@@ -9,7 +9,10 @@ use std::{
 };
 
 use sdr_core::spec::ComponentProfile;
-use sdr_files::{LoadedFile, Problems, link_profiles, load_any};
+use sdr_files::{
+    LoadedFile, Problems, link_profiles, load_any, parse_system,
+    robot::{Places, parse_robot},
+};
 
 fn golden() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden")
@@ -17,8 +20,8 @@ fn golden() -> PathBuf {
 
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
+        .expect("the folder of the repository")
+        .map(|entry| entry.expect("an entry of the folder").path())
         .filter(|path| path.extension().is_some_and(|word| word == "toml" || word == "yaml"))
         .collect();
     files.sort();
@@ -29,8 +32,8 @@ fn load(path: &Path) -> Result<LoadedFile, Problems> {
     let mut loaded = load_any(path)?;
     let linked = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("link_"));
     if let (LoadedFile::System(system), true) = (&mut loaded, linked) {
-        let profiles = fs::read_to_string(golden().join("profiles.json")).unwrap();
-        let profiles: Vec<ComponentProfile> = serde_json::from_str(&profiles).unwrap();
+        let profiles = fs::read_to_string(golden().join("profiles.json")).expect("profiles.json");
+        let profiles: Vec<ComponentProfile> = serde_json::from_str(&profiles).expect("profiles");
         link_profiles(system, &profiles)?;
     }
     Ok(loaded)
@@ -71,4 +74,35 @@ fn good_files_are_taken() {
             }
         }
     }
+}
+
+/// Every beginning of the file, and the file without each single line.
+fn broken(text: &str) -> impl Iterator<Item = String> {
+    let beginnings = text.char_indices().map(|(at, _)| text[..at].to_owned());
+    let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let without = (0..lines.len()).map(move |index| {
+        let mut lines = lines.clone();
+        lines.remove(index);
+        lines.join("\n")
+    });
+    beginnings.chain(without)
+}
+
+#[test]
+fn a_broken_file_is_refused_with_a_place_or_taken_and_never_a_panic() {
+    let root = golden().join("../..");
+    let system = fs::read_to_string(root.join("tests/golden/good/link_pair.yaml")).unwrap();
+    let robot = fs::read_to_string(root.join("tests/golden/good/robot.toml")).unwrap();
+    let places = Places::of_this_process();
+    let told = broken(&system)
+        .filter_map(|text| parse_system("s.yaml", &text, &root).err())
+        .chain(broken(&robot).filter_map(|text| parse_robot("r.toml", &text, &places).err()));
+
+    let mut refused = 0;
+    for problems in told {
+        refused += 1;
+        assert!(!problems.as_slice().is_empty() && !problems.to_string().is_empty());
+    }
+
+    assert!(refused > 100, "{refused}");
 }

@@ -6,7 +6,9 @@ use sdr_recovery::{Ladder, Limits, Policy, PolicyParts, Rule, Rung};
 use super::{
     conditions::trigger,
     find::{Finding, PolicyFile},
-    recovery_file::{LimitsTable, RecoveryFile, RuleChanges, RuleTable, RulesEntry, cause_of},
+    recovery_file::{
+        LimitsTable, RecoveryFile, RuleChanges, RuleTable, RulesEntry, UnknownFact, cause_of,
+    },
 };
 use crate::read::{At, Map, Reader};
 
@@ -59,6 +61,10 @@ impl PolicyFile for RecoveryFile {
         }
         if let Some(limits) = self.limits {
             apply_limits(limits, &mut parts.limits);
+        }
+        match self.unknown.map(|at| at.value) {
+            // What the rules do by themselves; the key says it to the reader.
+            Some(UnknownFact) | None => {}
         }
         parts.name = name?;
         if !reader.is_clean() {

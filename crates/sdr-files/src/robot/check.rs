@@ -16,8 +16,8 @@ use super::{
         RosConfig, SensorsConfig, StorageConfig, SystemPort,
     },
     file::{
-        CapacityTable, ComponentsTable, Devices, LogTable, MeshTable, RadioTable, RecordingsEntry,
-        RobotFile, RobotTable, SensorsTable, StorageTable,
+        CapacityTable, ComponentsTable, Devices, LogTable, MeshTable, RadioMode, RadioTable,
+        RecordingsEntry, RobotFile, RobotTable, SensorsTable, StorageTable,
     },
     places::Places,
     sources::{BatterySource, PositionSource, RssiEntry, RssiSource, SensorEntry},
@@ -228,8 +228,12 @@ fn bounded(at: &At<Duration>, range: (u64, u64), reader: &mut Reader) -> Duratio
 }
 
 fn radio(table: Option<RadioTable>, places: &Places, reader: &mut Reader) -> RadioConfig {
-    let (interface, rssi, period) =
-        table.map_or((None, None, None), |t| (t.interface, t.rssi, t.period));
+    let (interface, mode, rssi, period) =
+        table.map_or((None, None, None, None), |t| (t.interface, t.mode, t.rssi, t.period));
+    match mode.map(|at| at.value) {
+        // The only mode so far, and so the default.
+        Some(RadioMode) | None => {}
+    }
     RadioConfig {
         interface: interface.map(|at| at.value),
         rssi: match rssi.map(|at| at.value) {

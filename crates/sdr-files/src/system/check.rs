@@ -6,23 +6,24 @@ use sdr_core::{
     id::Name,
     record::{FleetValue, RECORD_BYTES_MAX},
     spec::{
-        ComponentSpec, ConnectionSpec, Execution, Isolation, IsolationAction, Launch, Needs,
-        PARTS_MAX, Place, PolicyBytes, PortRef, Qos, Reliability, Standby, SystemSpec, Value,
+        ComponentSpec, Execution, Isolation, IsolationAction, Launch, Needs, PARTS_MAX, Place,
+        Standby, SystemSpec, Value,
     },
     units::{Bytes, Permille},
 };
-use sdr_recovery::{Bar, Level, Trigger};
 
 use super::{
     ComponentPlaces, LoadedSystem, SystemPlaces,
-    circle::circle,
+    connections::connections,
     file::{
-        ComponentTable, ConnectionEntry, DefaultsTable, NeedsTable, OnData, PlaceTable, Rate,
-        StandbyTable, SystemFile,
+        ComponentTable, DefaultsTable, NeedsTable, OnData, PlaceTable, Rate, StandbyTable,
+        SystemFile,
     },
+    order::{check_names, check_start_order},
+    policies::policies,
 };
 use crate::{
-    policy::{AllocationFile, Finder, PolicyEntry, PolicyFile, RecoveryFile},
+    policy::Finder,
     problem::{Mark, Source},
     read::{At, Map, Reader},
 };
@@ -34,8 +35,6 @@ const PERIOD: Duration = Duration::from_millis(100);
 const ISOLATED_AFTER: Duration = Duration::from_secs(2);
 /// Most standbys of one component.
 const STANDBYS_MAX: u8 = 4;
-/// Deepest queue of one connection.
-const DEPTH_MAX: u8 = 64;
 
 /// The checked system; every problem is told to `reader`.
 pub(super) fn checked(
@@ -89,121 +88,12 @@ pub(super) fn checked(
     Some(LoadedSystem { spec, places })
 }
 
-type Named<F> = Option<At<PolicyEntry<F>>>;
-
-fn policies(
-    allocation: Named<AllocationFile>,
-    recovery: Named<RecoveryFile>,
-    (finder, system): (&Finder, Option<&At<Name>>),
-    reader: &mut Reader,
-) -> (PolicyBytes, PolicyBytes) {
-    let (name, own) = system.map_or(("system", Mark::FILE), |at| (at.value.as_str(), at.mark));
-    let mark = allocation.as_ref().map_or(own, |entry| entry.mark);
-    let recovery_mark = recovery.as_ref().map_or(own, |entry| entry.mark);
-    let allocation = match allocation {
-        Some(entry) => finder.entry(entry, name, reader),
-        None => Some(AllocationFile::standard()),
-    };
-    let recovery = match recovery {
-        Some(entry) => finder.entry(entry, name, reader),
-        None => Some(RecoveryFile::standard()),
-    };
-    if let (Some(allocation), Some(recovery)) = (&allocation, &recovery) {
-        check_bars(allocation, recovery, mark, reader);
-    }
-    let allocation = allocation.map(|policy| policy.encode()).unwrap_or_default();
-    let recovery = recovery.map(|policy| policy.encode()).unwrap_or_default();
-    check_size(&FleetValue::Allocation(allocation.clone()), mark, "allocation policy", reader);
-    check_size(&FleetValue::Recovery(recovery.clone()), recovery_mark, "recovery policy", reader);
-    (allocation, recovery)
-}
-
-/// A home that allocation may choose must not be in trouble at once by recovery's bar.
-fn check_bars(
-    allocation: &sdr_alloc::Policy,
-    recovery: &sdr_recovery::Policy,
-    mark: Mark,
-    reader: &mut Reader,
-) {
-    let fault = recovery.parts().rules.iter().find_map(|rule| match rule.trigger {
-        Trigger::Condition(condition) => match condition.bar {
-            Bar::AtMost(Level::Memory(bytes)) => Some(bytes),
-            Bar::AtMost(Level::Share(_) | Level::Signal(_) | Level::Time(_)) | Bar::AtLeast(_) => {
-                None
-            }
-        },
-        Trigger::Fault => None,
-    });
-    let (tier, bars) = match &allocation.relaxed {
-        Some(relaxed) => ("relaxed", relaxed),
-        None => ("first", &allocation.strict),
-    };
-    if let (Some(fault), Some(home)) = (fault, bars.memory_free_at_least)
-        && home <= fault
-    {
-        let message = format!(
-            "allocation `{}` ({tier} tier) fills robots to {home} free, where recovery `{}` sees memory-short (at most {fault})",
-            allocation.name,
-            recovery.parts().name,
-        );
-        let help = format!("allowed: memory_free at_least more than {fault}");
-        reader.problem(mark, message, Some(help));
-    }
-}
-
-fn check_size(value: &FleetValue, mark: Mark, what: &str, reader: &mut Reader) {
+pub(super) fn check_size(value: &FleetValue, mark: Mark, what: &str, reader: &mut Reader) {
     let size = value.encode().len();
     if size > RECORD_BYTES_MAX {
         let message = format!("the {what} takes {size} bytes on the mesh");
         let help = format!("allowed: at most {RECORD_BYTES_MAX}; shorten names, lists, parameters");
         reader.problem(mark, message, Some(help));
-    }
-}
-
-type Entries = [(At<String>, Option<At<ComponentTable>>)];
-
-/// Names that a component gives of others are there, and not its own.
-fn check_names(entries: &Entries, names: &[&str], reader: &mut Reader) {
-    for (own, table) in entries {
-        let Some(table) = table else { continue };
-        let place = table.value.place.as_ref();
-        let lists = [
-            ("after", table.value.after.as_ref()),
-            ("apart_from", place.and_then(|place| place.apart_from.as_ref())),
-            ("together_with", place.and_then(|place| place.together_with.as_ref())),
-        ];
-        for (key, list) in lists {
-            for name in list.map(|list| list.value.as_slice()).unwrap_or_default() {
-                if name.value.as_str() == own.value {
-                    let message = format!("`{}` names itself in `{key}`", own.value);
-                    reader.problem(name.mark, message, None);
-                } else if !names.contains(&name.value.as_str()) {
-                    reader.unknown(name.mark, "component", name.value.as_str(), names);
-                }
-            }
-        }
-    }
-}
-
-fn check_start_order(entries: &Entries, reader: &mut Reader) {
-    let order: Vec<(Name, Vec<Name>)> = entries
-        .iter()
-        .filter_map(|(name, table)| {
-            let after = table.as_ref()?.value.after.as_ref();
-            let after = after.map(|list| list.value.iter().map(|at| at.value.clone()).collect());
-            Some((Name::new(&name.value).ok()?, after.unwrap_or_default()))
-        })
-        .collect();
-    let Some(circle) = circle(&order) else { return };
-    let words: Vec<&str> = circle.iter().map(Name::as_str).collect();
-    let place = entries.iter().find(|(name, _)| name.value == words[0]).and_then(|(_, table)| {
-        let after = table.as_ref()?.value.after.as_ref()?;
-        after.value.iter().find(|at| at.value == circle[1]).map(|at| at.mark)
-    });
-    // A name of its own in `after` was told before.
-    if words.len() > 2 {
-        let message = format!("the start order goes round in a circle: {}", words.join(" after "));
-        reader.problem(place.unwrap_or(Mark::FILE), message, None);
     }
 }
 
@@ -276,7 +166,7 @@ fn component(
     let launch =
         Launch::Native { executable: run.value.executable, arguments: run.value.arguments };
     let name = checked_name?;
-    let places = ComponentPlaces { name: name.clone(), run: run.mark, parameters: parameter_marks };
+    let places = ComponentPlaces { run: run.mark, parameters: parameter_marks };
     let component = ComponentSpec {
         name,
         index: 0,
@@ -333,66 +223,4 @@ fn parameters(given: Option<Map<At<Value>>>, reader: &mut Reader) -> Parameters 
         parameters.0.push((name.value, value.value));
     }
     parameters
-}
-
-/// Connections, and the places of both ends.
-type Connections = (Vec<ConnectionSpec>, Vec<(Mark, Mark)>);
-
-fn connections(
-    given: Option<At<Vec<ConnectionEntry>>>,
-    names: &[&str],
-    reader: &mut Reader,
-) -> Connections {
-    let mut made: Connections = (Vec::new(), Vec::new());
-    let Some(given) = given else { return made };
-    if given.value.len() > PARTS_MAX {
-        let message = format!("{} connections", given.value.len());
-        reader.problem(given.mark, message, Some(format!("allowed: at most {PARTS_MAX}")));
-        return made;
-    }
-    for ConnectionEntry(entry) in given.value {
-        let table = entry.value;
-        let from = port(&table.from, names, reader);
-        let to = port(&table.to, names, reader);
-        if let Some(depth) = &table.depth
-            && !(1..=DEPTH_MAX).contains(&depth.value)
-        {
-            let message = format!("depth {}", depth.value);
-            reader.problem(depth.mark, message, Some(format!("allowed: 1 to {DEPTH_MAX}")));
-        }
-        let (Some(from), Some(to)) = (from, to) else { continue };
-        if made.0.iter().any(|other| other.from == from && other.to == to) {
-            let message = format!("connection {from} -> {to} is there twice");
-            reader.problem(entry.mark, message, None);
-            continue;
-        }
-        let usual = Qos::default();
-        let qos = Qos {
-            reliability: table.qos.map_or(Reliability::Reliable, |at| at.value),
-            depth: table.depth.map_or(usual.depth, |at| at.value),
-            deadline: table.deadline.map(|at| at.value),
-        };
-        let index = u16::try_from(made.0.len()).unwrap_or(u16::MAX);
-        made.0.push(ConnectionSpec { index, from, to, message_type: String::new(), qos });
-        made.1.push((table.from.mark, table.to.mark));
-    }
-    made
-}
-
-/// `component.port` with a component of this system.
-fn port(at: &At<String>, names: &[&str], reader: &mut Reader) -> Option<PortRef> {
-    let Some((component, port)) = at.value.split_once('.') else {
-        let message = format!("`{}` is no port", at.value);
-        reader.problem(at.mark, message, Some(String::from("allowed: component.port")));
-        return None;
-    };
-    let mut name = |word: &str| {
-        Name::new(word).map_err(|error| reader.problem(at.mark, error.to_string(), None)).ok()
-    };
-    let port = PortRef { component: name(component)?, port: name(port)? };
-    if !names.contains(&component) {
-        reader.unknown(at.mark, "component", component, names);
-        return None;
-    }
-    Some(port)
 }

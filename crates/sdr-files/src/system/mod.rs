@@ -2,12 +2,15 @@
 
 mod check;
 mod circle;
+mod connections;
 mod file;
 mod link;
+mod order;
+mod policies;
 
 use std::path::{Path, PathBuf};
 
-use sdr_core::{id::Name, spec::SystemSpec};
+use sdr_core::spec::SystemSpec;
 
 pub(crate) use file::SystemFile;
 pub use link::link_profiles;
@@ -40,7 +43,6 @@ pub(crate) struct SystemPlaces {
 /// Where the parts of a component stand.
 #[derive(Clone, Debug)]
 pub(crate) struct ComponentPlaces {
-    pub(crate) name: Name,
     pub(crate) run: Mark,
     /// Names and values of parameters.
     pub(crate) parameters: Vec<(Mark, Mark)>,

@@ -1,6 +1,7 @@
 //! What a system means.
 
 use sdr_core::{
+    id::Name,
     recover::Cause,
     spec::{ComponentProfile, ParameterProfile, PortProfile, Value},
 };
