@@ -181,8 +181,8 @@ impl InRoute {
         });
         match sent {
             Ok(_) => {
-                self.counts.injected.add(1);
                 self.counts.injected_bytes.add(body.len() as u64);
+                self.counts.injected.add(1);
             }
             Err(error) => {
                 self.counts.dropped_memory.add(1);

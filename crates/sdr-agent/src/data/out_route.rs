@@ -160,8 +160,8 @@ impl OutRoute {
         };
         match transport.send(endpoint, &origin, body) {
             Ok(()) => {
-                self.counts.forwarded.add(1);
                 self.counts.forwarded_bytes.add(body.len() as u64);
+                self.counts.forwarded.add(1);
             }
             Err(error @ (SendError::Backlog | SendError::Broken(_))) => {
                 self.counts.dropped_unsent.add(1);
