@@ -203,7 +203,9 @@ fn what_the_active_instance_sends_arrives_with_its_token_and_numbers() {
         assert_eq!(sample.header().token(), Some(token(1)));
     }
     // A sample is counted just after it was handed on.
-    until("all to be counted", || pair.b.counters(Way::In).injected == 4);
+    until("all to be counted", || {
+        pair.a.counters(Way::Out).forwarded == 4 && pair.b.counters(Way::In).injected == 4
+    });
     let (out, into) = (pair.a.counters(Way::Out), pair.b.counters(Way::In));
     assert_eq!((out.forwarded, out.forwarded_bytes, out.matched), (4, 357_607, 1));
     assert_eq!((into.injected, into.injected_bytes, into.matched), (4, 357_607, 1));
