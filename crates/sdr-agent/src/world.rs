@@ -114,7 +114,7 @@ impl World {
             .map_err(|source| StartError::Mesh { address, source })?;
         let mut brain_config = config::brain(robot);
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
-        let seams = Seams { recovery: Box::new(|_| Err("wait".into())) };
+        let seams = Seams { recovery: Box::new(sdr_recovery::make) };
         let brain = Brain::new(brain_config, seams, ground.stored, clock::now());
 
         let outlets = Outlets {

@@ -1,1 +1,475 @@
-//! Real processes, real sockets.
+//! Real processes, a real socket. The component is this test binary, started again.
+
+use std::io::{Read as _, Write as _};
+use std::os::unix::net::UnixStream;
+use std::time::Duration;
+use std::{env, fs, thread};
+
+use sdr_component::protocol::{
+    Beat, Counters, ENV_COMPONENT, ENV_INSTANCE, ENV_ORPHAN_MS, ENV_SOCKET, FromComponent, Hello,
+    LineBuffer, Order, PROTOCOL_VERSION, StateReport, ToComponent, encode_line,
+};
+use sdr_core::{
+    id::{Name, RobotId},
+    lifecycle::LifecycleState,
+    order::{Epoch, Token},
+    recover::{Cause, Fault},
+    spec::{
+        ComponentProfile, ComponentSpec, Execution, Isolation, IsolationAction, Launch, Needs,
+        Place, Standby, Value,
+    },
+};
+use tempfile::TempDir;
+use tokio::task::LocalSet;
+
+use super::*;
+use crate::events::Events;
+
+fn robot() -> RobotId {
+    RobotId::new("robot-1").unwrap()
+}
+
+fn key() -> ComponentKey {
+    ComponentKey::new(&Name::new("mapping").unwrap(), &Name::new("lidar").unwrap())
+}
+
+fn token(run: u32) -> Token {
+    Token { epoch: Epoch::first(&robot()), run }
+}
+
+/// A supervisor and everything round it.
+struct Bench {
+    dir: TempDir,
+    supervisor: Supervisor,
+    inputs: mpsc::Receiver<Input>,
+    events: Events,
+    trouble: Trouble,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let own = env::current_exe().unwrap();
+        let patience = Patience {
+            hello: Duration::from_millis(600),
+            finish: Duration::from_millis(200),
+            terminate: Duration::from_millis(200),
+            ..Patience::default()
+        };
+        let config = SupervisorConfig {
+            path: vec![dir.path().join("bin"), own.parent().unwrap().into()],
+            socket: dir.path().join("c.sock"),
+            state: dir.path().into(),
+            logs: LogFiles {
+                dir: dir.path().join("logs"),
+                each_bytes_max: 1 << 20,
+                bytes_max: 1 << 20,
+            },
+            on_agent_death: OnAgentDeath::Stop,
+            devices: BTreeMap::from([("wheels".into(), "/dev/wheels0".into())]),
+            memory: SharedMemory { prefix: "t_".into(), root: "/dev/shm/t/".into() },
+            patience,
+        };
+        fs::create_dir(dir.path().join("bin")).unwrap();
+        let events = Events::new(robot());
+        let trouble = Trouble::new(events.clone());
+        let (sender, inputs) = mpsc::channel(256);
+        let outlets = Outlets {
+            inputs: sender,
+            watch: Watch::default(),
+            record: RecordSender::nowhere(&robot()),
+            trouble: trouble.clone(),
+            types: PortTypes::default(),
+        };
+        let supervisor = Supervisor::start(config, outlets).unwrap();
+        Self { dir, supervisor, inputs, events, trouble }
+    }
+
+    /// A shell script as an executable.
+    fn script(&self, name: &str, lines: &str) {
+        use std::os::unix::fs::PermissionsExt as _;
+        let path = self.dir.path().join("bin").join(name);
+        fs::write(&path, format!("#!/bin/sh\n{lines}\n")).unwrap();
+        fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+
+    fn launch(&self, instance: InstanceId, executable: &str) {
+        self.supervisor.launch(order(instance, executable, Vec::new(), ""));
+    }
+
+    /// Starts this test binary as a component that behaves as `manner` says.
+    fn launch_component(&self, instance: InstanceId, manner: &str) {
+        let own = env::current_exe().unwrap();
+        let name = own.file_name().unwrap().to_str().unwrap();
+        let role = "supervisor::tests::the_component_of_these_tests";
+        let arguments = ["--exact", role, "--nocapture"].map(String::from).to_vec();
+        self.supervisor.launch(order(instance, name, arguments, manner));
+    }
+
+    /// The next news of `instance`.
+    async fn news(&mut self, instance: InstanceId) -> InstanceNews {
+        loop {
+            match self.inputs.recv().await.unwrap() {
+                Input::Instance { instance: of, news } if of == instance => return news,
+                _ => {}
+            }
+        }
+    }
+
+    async fn until_state(&mut self, instance: InstanceId, wanted: LifecycleState) {
+        loop {
+            match self.news(instance).await {
+                InstanceNews::State { state, .. } if state == wanted => return,
+                InstanceNews::Exited { reason } => panic!("{reason}"),
+                _ => {}
+            }
+        }
+    }
+
+    async fn until_exit(&mut self, instance: InstanceId) -> String {
+        loop {
+            if let InstanceNews::Exited { reason } = self.news(instance).await {
+                return reason;
+            }
+        }
+    }
+}
+
+fn order(
+    instance: InstanceId,
+    executable: &str,
+    arguments: Vec<String>,
+    manner: &str,
+) -> LaunchOrder {
+    let spec = ComponentSpec {
+        name: key().name,
+        index: 0,
+        launch: Launch::Native { executable: executable.into(), arguments },
+        needs: Needs::default(),
+        execution: Execution::Periodic { period: Duration::from_millis(20) },
+        devices: vec![Name::new("wheels").unwrap()],
+        place: Place::default(),
+        after: Vec::new(),
+        actuator: false,
+        on_isolation: Isolation { action: IsolationAction::Continue, after: Duration::ZERO },
+        standby: Standby::default(),
+        parameters: vec![("manner".into(), Value::Text(manner.into()))],
+    };
+    LaunchOrder { instance, component: key(), spec, inputs: Vec::new(), output_depth: 8 }
+}
+
+fn run<F: Future>(test: F) -> F::Output {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    LocalSet::new().block_on(&runtime, test)
+}
+
+/// Not a test: what [`Bench::launch_component`] starts.
+#[test]
+fn the_component_of_these_tests() {
+    let Ok(socket) = env::var(ENV_SOCKET) else { return };
+    assert_eq!(env::var(ENV_COMPONENT).unwrap(), key().to_string());
+    assert_eq!(env::var(ENV_ORPHAN_MS).unwrap(), "500");
+    let mut stream = UnixStream::connect(socket).unwrap();
+    let say = |stream: &mut UnixStream, message: &FromComponent| {
+        stream.write_all(&encode_line(message).unwrap()).unwrap();
+    };
+    let report = |state, token| StateReport { state, token, fault: None };
+    let profile = ComponentProfile {
+        name: "tests".into(),
+        about: String::new(),
+        inputs: Vec::new(),
+        outputs: Vec::new(),
+        parameters: Vec::new(),
+    };
+    let hello = Hello {
+        v: PROTOCOL_VERSION,
+        component: key(),
+        instance: env::var(ENV_INSTANCE).unwrap().parse().unwrap(),
+        pid: std::process::id(),
+        profile,
+        now: report(LifecycleState::Created, None),
+    };
+    say(&mut stream, &FromComponent::Hello(Box::new(hello)));
+    let mut manner = String::new();
+    let mut buffer = LineBuffer::default();
+    let mut bytes = [0; 4096];
+    loop {
+        let length = stream.read(&mut bytes).unwrap();
+        if length == 0 {
+            return;
+        }
+        buffer.push(&bytes[..length]);
+        while let Some(message) = buffer.next_message::<ToComponent>().unwrap() {
+            match message {
+                ToComponent::Configure(configure) => {
+                    assert_eq!(configure.devices["wheels"], "/dev/wheels0");
+                    manner = configure.parameters["manner"].to_string();
+                    let state = report(LifecycleState::Inactive, None);
+                    say(&mut stream, &FromComponent::State(state));
+                }
+                ToComponent::Command(Order::Activate { token }) => {
+                    let state = report(LifecycleState::Active, Some(token));
+                    say(&mut stream, &FromComponent::State(state));
+                    say(&mut stream, &FromComponent::Beat(Beat::default()));
+                    say(&mut stream, &FromComponent::Counters(Counters::default()));
+                    match manner.as_str() {
+                        "garbage" => stream.write_all(b"{\"type\":\"sing\"}\n").unwrap(),
+                        "crash" => panic!("the lidar is on fire"),
+                        _ => {}
+                    }
+                }
+                ToComponent::Command(Order::Finish) if manner == "deaf" => {}
+                ToComponent::Command(Order::Finish) => std::process::exit(0),
+                ToComponent::Command(Order::Deactivate | Order::Reset) => {
+                    let fault = Fault { cause: Cause::Error, reason: "worn out".into() };
+                    let state =
+                        StateReport { fault: Some(fault), ..report(LifecycleState::Error, None) };
+                    say(&mut stream, &FromComponent::State(state));
+                }
+                ToComponent::Reconfigure(_) => {}
+                ToComponent::Error(error) => {
+                    // What the agent said is told by the last line of output.
+                    eprintln!("{}", error.message);
+                    thread::sleep(Duration::from_millis(50));
+                    std::process::exit(3);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_component_is_configured_commanded_and_finished() {
+    run(async {
+        let mut bench = Bench::new();
+        bench.launch_component(1, "good");
+        assert!(matches!(bench.news(1).await, InstanceNews::Started { pid } if pid > 0));
+        // Before it has greeted: kept for it.
+        bench.supervisor.command(1, Command::Activate(token(4)));
+        bench.until_state(1, LifecycleState::Inactive).await;
+        let InstanceNews::State { state: LifecycleState::Active, token: Some(found), .. } =
+            bench.news(1).await
+        else {
+            panic!("not active")
+        };
+        assert_eq!(found, token(4));
+
+        bench.supervisor.command(1, Command::Reset);
+        let InstanceNews::State { fault: Some((Cause::Error, reason)), .. } = bench.news(1).await
+        else {
+            panic!("no fault")
+        };
+        assert_eq!(reason, "worn out");
+
+        bench.supervisor.command(1, Command::Finish);
+        assert!(bench.until_exit(1).await.starts_with("exit status 0"));
+        assert!(bench.supervisor.shared.kept.borrow().is_empty());
+        assert!(journal::read(bench.dir.path()).is_empty());
+    });
+}
+
+#[test]
+fn a_crash_is_told_with_its_last_words() {
+    run(async {
+        let mut bench = Bench::new();
+        bench.launch_component(1, "crash");
+        bench.supervisor.command(1, Command::Activate(token(1)));
+
+        bench.until_state(1, LifecycleState::Active).await;
+        let reason = bench.until_exit(1).await;
+
+        assert!(reason.starts_with("exit status 101; last output: "), "{reason}");
+        assert!(reason.contains("the lidar is on fire"), "{reason}");
+    });
+}
+
+#[test]
+fn an_exit_is_told_with_its_status_and_at_most_five_lines() {
+    run(async {
+        let mut bench = Bench::new();
+        bench.script("brief", "for i in 1 2 3 4 5 6 7; do echo line $i; done; exit 7");
+        bench.launch(9, "brief");
+
+        let reason = bench.until_exit(9).await;
+
+        assert_eq!(
+            reason,
+            "exit status 7; last output: line 3 | line 4 | line 5 | line 6 | line 7"
+        );
+        let log = bench.dir.path().join("logs/mapping.lidar.log");
+        assert_eq!(fs::read_to_string(log).unwrap().lines().count(), 7);
+    });
+}
+
+#[test]
+fn an_executable_that_is_nowhere_is_told_with_the_folders() {
+    run(async {
+        let mut bench = Bench::new();
+        for (instance, name) in [(1, "absent"), (2, "../bin/sh")] {
+            bench.launch(instance, name);
+            let InstanceNews::LaunchFailed { reason } = bench.news(instance).await else {
+                panic!("launched")
+            };
+            assert!(reason.contains(name), "{reason}");
+        }
+        bench.launch(3, "absent");
+        let InstanceNews::LaunchFailed { reason } = bench.news(3).await else { panic!() };
+        assert!(reason.contains("/bin,") && reason.contains("[components] path"), "{reason}");
+    });
+}
+
+#[test]
+fn a_process_that_never_greets_is_told_and_can_be_killed_with_its_children() {
+    run(async {
+        let mut bench = Bench::new();
+        let mark = bench.dir.path().join("child");
+        let lines = format!("sleep 1000 & echo $! > {}; trap '' TERM; wait; wait", mark.display());
+        bench.script("silent", &lines);
+        bench.launch(1, "silent");
+        assert!(matches!(bench.news(1).await, InstanceNews::Started { .. }));
+
+        let InstanceNews::Hung { reason } = bench.news(1).await else { panic!("not hung") };
+        assert!(reason.contains("no greeting for 0.6 s"), "{reason}");
+
+        bench.supervisor.command(1, Command::Finish);
+        let reason = bench.until_exit(1).await;
+        assert!(reason.contains("killed by signal 9"), "{reason}");
+        let child: u32 = fs::read_to_string(mark).unwrap().trim().parse().unwrap();
+        while journal::start_time(child).is_some() && !is_zombie(child) {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    });
+}
+
+fn is_zombie(pid: u32) -> bool {
+    fs::read_to_string(format!("/proc/{pid}/stat")).is_ok_and(|text| text.contains(") Z "))
+}
+
+#[test]
+fn a_component_without_beats_is_told_while_it_is_active() {
+    run(async {
+        let mut bench = Bench::new();
+        bench.launch_component(1, "mute");
+        bench.supervisor.command(1, Command::Activate(token(1)));
+        bench.until_state(1, LifecycleState::Active).await;
+
+        let InstanceNews::Hung { reason } = bench.news(1).await else { panic!("not hung") };
+
+        assert!(reason.contains("no beat"), "{reason}");
+        bench.supervisor.command(1, Command::Kill);
+        assert!(bench.until_exit(1).await.contains("signal 9"));
+    });
+}
+
+#[test]
+fn garbage_of_a_component_closes_its_line_and_nobody_elses() {
+    run(async {
+        let mut bench = Bench::new();
+        bench.launch_component(1, "garbage");
+        bench.launch_component(2, "good");
+        bench.supervisor.command(2, Command::Activate(token(1)));
+        bench.until_state(2, LifecycleState::Active).await;
+
+        bench.supervisor.command(1, Command::Activate(token(1)));
+        let reason = bench.until_exit(1).await;
+
+        assert!(reason.starts_with("exit status 3") && reason.contains("sing"), "{reason}");
+        assert_eq!(bench.trouble.counters()["component_lines_bad"], 1);
+        bench.supervisor.command(2, Command::Finish);
+        assert!(bench.until_exit(2).await.starts_with("exit status 0"));
+    });
+}
+
+#[test]
+fn strangers_on_the_socket_get_an_error_and_are_counted() {
+    run(async {
+        let mut bench = Bench::new();
+        bench.script("sleeper", "exec sleep 1000");
+        bench.launch(1, "sleeper");
+        assert!(matches!(bench.news(1).await, InstanceNews::Started { .. }));
+        let socket = bench.dir.path().join("c.sock");
+        // The right words from the wrong process.
+        let hello = r#"{"type":"hello","v":1,"component":{"system":"mapping","name":"lidar","scope":null},"instance":INSTANCE,"pid":1,"profile":{"name":"x","inputs":[],"outputs":[]},"now":{"state":"created"}}"#;
+        let lines = [
+            ("GET / HTTP/1.1".to_string(), "line 1"),
+            (hello.replace("INSTANCE", "1"), "is not the process of instance 1"),
+            (hello.replace("INSTANCE", "77"), "instance 77 of mapping/lidar was not started"),
+            (hello.replace("\"v\":1", "\"v\":9").replace("INSTANCE", "1"), "protocol version 9"),
+            (
+                r#"{"type":"beat","ticks":1,"late":0,"period_worst_ns":0,"execute_worst_ns":0}"#
+                    .into(),
+                "must be `hello`",
+            ),
+            ("x".repeat(70_000), "longer than"),
+        ];
+        for (line, wanted) in &lines {
+            let line = format!("{line}\n");
+            let socket = socket.clone();
+            let answer = tokio::task::spawn_blocking(move || {
+                let mut stream = UnixStream::connect(socket).unwrap();
+                // A line that is too long is refused before its end.
+                let _ = stream.write_all(line.as_bytes());
+                let mut answer = String::new();
+                let _ = stream.read_to_string(&mut answer);
+                answer
+            });
+            let answer = answer.await.unwrap();
+            assert!(answer.contains(wanted), "{answer:?} {wanted}");
+        }
+        let counters = bench.trouble.counters();
+        assert_eq!(counters["component_lines_bad"] + counters["component_hellos_refused"], 6);
+        assert_eq!(bench.events.since(0).len(), 2);
+        bench.supervisor.command(1, Command::Kill);
+        bench.until_exit(1).await;
+    });
+}
+
+#[test]
+fn stopping_ends_all_components_deaf_ones_too() {
+    run(async {
+        let mut bench = Bench::new();
+        bench.launch_component(1, "good");
+        bench.launch_component(2, "deaf");
+        bench.until_state(1, LifecycleState::Inactive).await;
+        bench.until_state(2, LifecycleState::Inactive).await;
+        let pids: Vec<u32> =
+            journal::read(bench.dir.path()).iter().map(|entry| entry.pid).collect();
+        assert_eq!(pids.len(), 2);
+
+        bench.supervisor.stop().await;
+
+        for pid in pids {
+            assert_eq!(journal::start_time(pid), None);
+        }
+        assert!(!bench.dir.path().join("c.sock").exists());
+    });
+}
+
+#[test]
+fn leftovers_of_a_killed_agent_are_ended_and_others_are_not() {
+    run(async {
+        let mut bench = Bench::new();
+        bench.script("sleeper", "while true; do sleep 1000; done");
+        bench.launch(1, "sleeper");
+        assert!(matches!(bench.news(1).await, InstanceNews::Started { .. }));
+        // As if an agent had died: its journal, and a process that was given an old number.
+        let predecessor = tempfile::tempdir().unwrap();
+        let mut bystander = std::process::Command::new("sleep").arg("1000").spawn().unwrap();
+        let mut entries = journal::read(bench.dir.path());
+        let mut other = entries[0].clone();
+        other.pid = bystander.id();
+        entries.push(other);
+        fs::write(predecessor.path().join("processes.json"), serde_json::to_vec(&entries).unwrap())
+            .unwrap();
+
+        end_leftovers(predecessor.path(), &bench.events);
+
+        assert!(bench.until_exit(1).await.contains("signal 15"));
+        let said = bench.events.since(0);
+        assert_eq!(said.len(), 1);
+        assert_eq!(said[0].event.kind, "leftover-ended");
+        assert!(bystander.try_wait().unwrap().is_none());
+        bystander.kill().unwrap();
+        bystander.wait().unwrap();
+    });
+}
