@@ -2,7 +2,7 @@
 
 use std::os::fd::{AsFd, BorrowedFd};
 
-use sdr_component::shm::{Memory, SampleHeader, Subscriber};
+use sdr_component::shm::{Memory, Subscriber};
 
 use super::complaint::Complaint;
 
@@ -11,13 +11,11 @@ const DEPTH: u8 = 16;
 /// Most samples taken before others get their turn.
 const TURN_MAX: usize = 64;
 
-/// One sample of a tapped port.
+/// One sample of a tapped port, whether made here or put in by the bridge.
 #[derive(Debug)]
 pub(crate) struct TapSample<'a> {
     /// `system.component.port`, as asked for.
     pub(crate) port: &'a str,
-    /// Token, sequence, times; its flag tells what came from another robot.
-    pub(crate) header: &'a SampleHeader,
     /// CDR without an encapsulation header, little endian.
     pub(crate) body: &'a [u8],
 }
@@ -53,11 +51,9 @@ impl Tap {
         source.clear_wakes();
         for _ in 0..TURN_MAX {
             match source.receive() {
-                Ok(Some(sample)) => sink(TapSample {
-                    port: &self.port,
-                    header: sample.header(),
-                    body: sample.payload(),
-                }),
+                Ok(Some(sample)) => {
+                    sink(TapSample { port: &self.port, body: sample.payload() });
+                }
                 Ok(None) => return,
                 Err(error) => return self.complaint.say("tap-unread", &self.port, &error),
             }
