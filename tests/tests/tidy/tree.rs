@@ -44,11 +44,11 @@ pub(super) fn pages() -> Vec<Page> {
 }
 
 fn gather(folder: &Path, prefix: &str, pages: &mut Vec<Page>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let entry = entry.unwrap();
+    for entry in fs::read_dir(folder).expect("folders of the repository can be read") {
+        let entry = entry.expect("a folder stays while it is read");
         let name = entry.file_name().into_string().expect("names of files are UTF-8");
         let path = format!("{prefix}{name}");
-        if entry.file_type().unwrap().is_dir() {
+        if entry.file_type().expect("every file has a type").is_dir() {
             // A demo leaves its report where it was started.
             if !MADE.contains(&name.as_str()) && !name.starts_with("sdr-demo-") {
                 gather(&entry.path(), &format!("{path}/"), pages);
