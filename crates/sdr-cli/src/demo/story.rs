@@ -27,7 +27,7 @@ use crate::{
     failure::Failure,
     locate,
     output::Format,
-    render::status::is_active,
+    render::status::{is_active, problems, screen},
     report::{
         Report,
         extra::{self, Bars, Coordinator, Extra},
@@ -337,7 +337,7 @@ impl Story<'_> {
         let mut lines = vec![format!("awaited in vain ({what}): {}", self.board.awaited())];
         if let Some(status) = self.watch.any() {
             lines.push(format!("last status, seen from {}:", status.seen_from));
-            let screen = crate::render::status::screen(status, 100);
+            let screen = screen(status, &problems(status), 100);
             lines.extend(screen.into_iter().map(|line| format!("  {line}")));
         }
         for (robot, reason) in &self.watch.unanswered {
