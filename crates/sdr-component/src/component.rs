@@ -39,7 +39,8 @@ pub trait Component: Sized {
         Ok(())
     }
 
-    /// Each tick while active.
+    /// Each tick while active. One that runs on data should take all that waits: the next tick
+    /// comes with the next sample.
     fn on_execute(&mut self, _context: &mut Context<'_>) -> Outcome {
         Ok(())
     }

@@ -5,7 +5,7 @@
 //! ([`sensor_msgs::ImageView`]). Lengths in received bytes are bounds, not claims: bodies may
 //! carry up to 3 bytes of padding at the end, and no bytes at all make a reader panic.
 //!
-//! A message of your own: a struct in field order, `serde`, and [`plain_message!`].
+//! A message of your own: a struct in field order, `serde`, and [`plain_message!`](crate::plain_message).
 
 pub mod builtin_interfaces;
 mod cdr;
@@ -137,7 +137,7 @@ macro_rules! plain_message {
     };
 }
 
-/// Used by [`plain_message!`]: the length of `value` in CDR.
+/// Used by [`plain_message!`](crate::plain_message): the length of `value` in CDR.
 #[doc(hidden)]
 pub fn plain_len<T: Serialize>(value: &T) -> usize {
     let mut count = cdr::Count(0);
@@ -146,14 +146,14 @@ pub fn plain_len<T: Serialize>(value: &T) -> usize {
     count.0
 }
 
-/// Used by [`plain_message!`]: writes `value` in CDR.
+/// Used by [`plain_message!`](crate::plain_message): writes `value` in CDR.
 #[doc(hidden)]
 pub fn plain_encode<T: Serialize>(value: &T, mut out: &mut [u8]) -> Result<(), CdrError> {
     cdr_encoding::to_writer::<T, byteorder::LittleEndian, _>(&mut out, value)
         .map_err(|error| CdrError::Other(error.to_string()))
 }
 
-/// Used by [`plain_message!`]: reads a value from CDR.
+/// Used by [`plain_message!`](crate::plain_message): reads a value from CDR.
 #[doc(hidden)]
 pub fn plain_decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CdrError> {
     match cdr_encoding::from_bytes::<T, byteorder::LittleEndian>(bytes) {
