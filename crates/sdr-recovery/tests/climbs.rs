@@ -267,6 +267,42 @@ fn a_new_component_does_not_begin_a_hold_that_its_robot_is_in() {
 }
 
 #[test]
+fn a_fault_after_short_memory_is_over_begins_at_the_bottom_of_its_own_ladder() {
+    let mut scene = scene();
+    scene.robot(|robot| robot.memory_free = Some(Bytes::mega(90)));
+    scene.judge_at(0);
+    scene.sleep_until(2_000);
+    scene.outcome("camera", RemedyOutcome::Done);
+    scene.robot(|robot| robot.memory_free = Some(Bytes::mega(900)));
+    scene.judge();
+    scene.sleep_until(7_000);
+
+    let verdicts = scene.fails(8_000, "camera", Cause::Exited);
+
+    assert_eq!((verdicts[0].cause, verdicts[0].remedy), (Cause::Exited, restart_after(200)));
+}
+
+#[test]
+fn a_break_between_two_looks_is_seen_at_its_deadline() {
+    let mut scene = scene();
+    let level = |tenths| {
+        move |robot: &mut sdr_core::recover::RobotEvidence| {
+            robot.rssi = Some(Dbm::from_tenths(tenths));
+        }
+    };
+    scene.robot(level(-850));
+    scene.judge_at(0);
+    scene.sleep_until(3_000);
+    scene.robot(level(-470));
+    scene.judge_at(3_000);
+    scene.sleep_until(4_000);
+    scene.robot(level(-850));
+    scene.judge_at(4_000);
+
+    assert_eq!(scene.sleep_until(60_000)[0].0, 10_500, "half a window and the whole hold anew");
+}
+
+#[test]
 fn an_engine_is_made_from_bytes_and_says_whose_bytes_are_broken() {
     assert_eq!(make(&PolicyBytes::default()).unwrap().not_back_for().as_secs(), 120);
     let broken = PolicyBytes { name: "mine".into(), bytes: vec![9] };

@@ -127,7 +127,8 @@ impl Scene {
         let mut all = Vec::new();
         while let Some(due) = self.engine.next_deadline().filter(|due| *due <= at(millis)) {
             assert!(due > self.now || self.now == at(0), "no deadline lies in the past");
-            let verdicts = self.judge_at(due.as_nanos() / 1_000_000);
+            self.now = due;
+            let verdicts = self.judge();
             all.extend(verdicts.into_iter().map(|one| (due.as_nanos() / 1_000_000, one)));
         }
         self.now = at(millis);
