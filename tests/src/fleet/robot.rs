@@ -107,7 +107,7 @@ impl Robot {
             seed: (self.starts << 40) ^ (self.number as u64) << 33,
             ..BrainConfig::new(self.id.clone(), self.facts.clone())
         };
-        let seams = Seams { recovery: Box::new(|policy| sdr_recovery::make(policy)) };
+        let seams = Seams { recovery: Box::new(sdr_recovery::make) };
         self.brain = Some(Brain::new(config, seams, self.disk.clone(), now));
         self.carry_out(now);
     }

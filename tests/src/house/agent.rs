@@ -144,7 +144,7 @@ state = {state:?}
             view.event.component.as_ref().is_some_and(|name| name.as_str() == component)
         };
         let started = self.events("started");
-        let newest = started.iter().filter(of).next_back()?;
+        let newest = started.iter().rfind(of)?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a pid")]
         newest.event.numbers.get("pid").map(|pid| *pid as u32)
     }
