@@ -17,7 +17,7 @@ use super::{
     Plan,
     board::{Board, Step},
     ending,
-    fleet::{self, Fleet},
+    fleet::{Fleet, Folder},
     stage::{DRIVEN, FADING, Stage},
     system::{self, Available},
     watch::{LOOK_EVERY, Watch},
@@ -50,19 +50,18 @@ const MOVED: [&str; 2] = ["fisheye", "anomaly"];
 
 /// Plays it.
 pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Failure> {
-    let folder = fleet::folder()?;
+    let folder = Folder::new()?;
     for program in system::executables(folder.path())? {
         locate::component(&program)?;
     }
     let world = folder.path().join("w");
     let stage = Stage::start(&world)?;
     let bodies = stage.bodies(&world);
-    let fleet = Fleet::start(folder, &bodies, plan.coordinator.as_deref())?;
+    let fleet = Fleet::start(folder.path(), &bodies, plan.coordinator.as_deref())?;
     let board = Board::new(session, BARS);
     let watch = Watch::default();
-    // Dropped in this order: first the agents and all they started, then the world.
-    let mut story =
-        Story { fleet, stage, board, watch, plan, session, coordinator: Coordinator::default() };
+    let coordinator = Coordinator::default();
+    let mut story = Story { fleet, stage, folder, board, watch, plan, session, coordinator };
     story.meet().await?;
     let spec = story.deploy().await?;
     story.drive().await?;
@@ -81,9 +80,12 @@ pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Fai
     Ok(ExitCode::SUCCESS)
 }
 
+/// The first three are dropped in this order: agents and all they started, the world, and the
+/// folder in which both wrote.
 struct Story<'a> {
     fleet: Fleet,
     stage: Stage,
+    folder: Folder,
     board: Board,
     watch: Watch,
     plan: &'a Plan,
@@ -120,7 +122,8 @@ impl Story<'_> {
     async fn deploy(&mut self) -> Result<SystemSpec, Failure> {
         let client = &self.fleet.agent(RECEIVER).client;
         let available: Available = client.get("/v1/components").await?;
-        let empty = self.fleet.empty_folder()?;
+        // No policy lies in a folder that is not there: the built-in ones are taken.
+        let empty = self.folder.path().join("empty");
         let (ballast, images) = (self.plan.ballast, self.plan.images.as_deref());
         let spec = system::make(&available.components, &empty, ballast, images)?;
         let since = Instant::now();

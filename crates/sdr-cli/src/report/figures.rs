@@ -205,6 +205,10 @@ fn position_error(fixes: &[Fix], extra: &Extra) -> Option<(f64, f64)> {
     for fix in fixes.iter().filter(|fix| fix.topic == topic && fix.monotonic_ns <= until) {
         let Some((x, y)) = truth_at(&extra.truth, fix.monotonic_ns) else { continue };
         let error = (fix.x_m - x).hypot(fix.y_m - y);
+        // An estimator that does not know yet where it is says so by NaN.
+        if !error.is_finite() {
+            continue;
+        }
         sum += error;
         count += 1.0;
         worst = worst.max(error);
@@ -244,6 +248,26 @@ mod tests {
         assert_eq!((pause.gap_max_ns, pause.period_median_ns), (140, Some(20)));
         assert_eq!(command_pause(&times, 50, 900).unwrap().gap_max_ns, 660);
         assert_eq!(command_pause(&[5], 0, 10), None);
+    }
+
+    #[test]
+    fn an_estimate_that_knows_nothing_yet_is_no_error() {
+        let point = |ms: u64| TruthPoint { monotonic_ns: ms * 1_000_000, x_m: 1.0, y_m: 0.0 };
+        let fix = |ms: u64, x_m| Fix {
+            monotonic_ns: ms * 1_000_000,
+            topic: "/p".to_owned(),
+            x_m,
+            y_m: 0.0,
+        };
+        let extra = Extra {
+            position_topic: Some("/p".to_owned()),
+            truth: vec![point(0), point(50)],
+            ..Extra::default()
+        };
+        let fixes = [fix(10, f64::NAN), fix(20, 1.5), fix(30, 1.1)];
+        let (mean, worst) = position_error(&fixes, &extra).unwrap();
+        assert!((mean - 0.3).abs() < 1e-9 && (worst - 0.5).abs() < 1e-9);
+        assert_eq!(position_error(&fixes[..1], &extra), None);
     }
 
     #[test]

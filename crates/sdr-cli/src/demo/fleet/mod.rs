@@ -2,51 +2,37 @@
 
 mod agent;
 mod config;
+mod folder;
 mod ports;
 
 use std::{
     fs, io,
-    path::{Path, PathBuf},
+    path::Path,
     time::{Duration, Instant},
 };
 
 use sdr_lab::world::RobotPaths;
-use tempfile::TempDir;
 
 use super::ROBOTS;
 use crate::{failure::Failure, locate};
 
 pub(crate) use agent::Agent;
 use config::{Common, Places};
+pub(crate) use folder::Folder;
 
 /// How long agents may take to end what runs and to finish their recordings.
 const END_WITHIN: Duration = Duration::from_secs(4);
-/// Longest path of the temporary folder, bytes, so that sockets below it have short enough names.
-const FOLDER_BYTES_MAX: usize = 70;
 
 /// See the module.
 pub(crate) struct Fleet {
     /// The agents, in the order of [`ROBOTS`].
     pub(crate) agents: Vec<Agent>,
-    /// Removed when dropped, after the agents have ended.
-    folder: TempDir,
-}
-
-/// An empty temporary folder with a short path.
-pub(crate) fn folder() -> Result<TempDir, Failure> {
-    let make = |parent: &Path| tempfile::Builder::new().prefix("sdr-").tempdir_in(parent);
-    let parent = std::env::temp_dir();
-    let long = parent.as_os_str().len() + "/sdr-123456".len() > FOLDER_BYTES_MAX;
-    let parent = if long { PathBuf::from("/tmp") } else { parent };
-    make(&parent).map_err(|error| {
-        Failure::new(format!("cannot make a folder in {}: {error}", parent.display()))
-    })
 }
 
 impl Fleet {
     /// Writes the robots' files and starts their agents; bodies are in the order of [`ROBOTS`].
     pub(crate) fn start(
-        folder: TempDir,
+        folder: &Path,
         bodies: &[RobotPaths],
         coordinator: Option<&str>,
     ) -> Result<Self, Failure> {
@@ -62,9 +48,9 @@ impl Fleet {
         let fleet = format!("demo-{:x}", std::process::id());
         let common =
             Common { fleet: &fleet, ports: &ports, domain, programs: &programs, coordinator };
-        let mut started = Self { agents: Vec::new(), folder };
+        let mut started = Self { agents: Vec::new() };
         for (index, (robot, body)) in ROBOTS.into_iter().zip(bodies).enumerate() {
-            let places = Places::new(started.folder.path(), index);
+            let places = Places::new(folder, index);
             let text = config::text(&common, index, &places, body);
             write(&places.config, &text)
                 .map_err(|error| tell(&format!("write {}", places.config.display()), &error))?;
@@ -78,14 +64,6 @@ impl Fleet {
     pub(crate) fn agent(&self, robot: &str) -> &Agent {
         let agent = self.agents.iter().find(|agent| agent.robot == robot);
         agent.expect("every name in ROBOTS has an agent once the fleet has started")
-    }
-
-    /// A folder with nothing in it.
-    pub(crate) fn empty_folder(&self) -> Result<PathBuf, Failure> {
-        let folder = self.folder.path().join("empty");
-        fs::create_dir_all(&folder)
-            .map_err(|error| Failure::new(format!("cannot make {}: {error}", folder.display())))?;
-        Ok(folder)
     }
 
     /// Ends all agents and everything they started. Doing it again does nothing.
@@ -109,18 +87,4 @@ fn write(path: &Path, text: &str) -> io::Result<()> {
         fs::create_dir_all(folder)?;
     }
     fs::write(path, text)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sockets_in_the_folder_have_short_enough_names() {
-        let folder = folder().unwrap();
-        let socket = Places::new(folder.path(), 2).socket.with_extension("components.sock");
-        assert!(socket.as_os_str().len() <= 107, "{}", socket.display());
-        let eye = RobotPaths::new(&folder.path().join("w"), "robot-3").fisheye;
-        assert!(eye.as_os_str().len() <= 107, "{}", eye.display());
-    }
 }

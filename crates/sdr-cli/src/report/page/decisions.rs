@@ -130,6 +130,7 @@ fn list(report: &Report, events: &[&EventSample]) -> String {
 /// The reason, and the figures beside it.
 fn why(event: &EventSample) -> String {
     let numbers = event.number_names.iter().zip(&event.number_values);
+    let numbers = numbers.filter(|(name, _)| !name.ends_with("_ns") && *name != "cause");
     let numbers: Vec<String> =
         numbers.map(|(name, value)| format!("{name} {}", plain(name, *value))).collect();
     match (event.reason.is_empty(), numbers.is_empty()) {

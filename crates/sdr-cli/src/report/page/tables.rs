@@ -209,7 +209,10 @@ pub(super) fn connections(report: &Report) -> String {
         ">median period",
         ">longest pause at the move",
     ];
-    let note = "<p class=\"muted\">Sent is counted at the output from its first sample, also while nobody listens yet; lost are samples missing in the sequence; fenced are samples of an old home, refused.</p>\n";
+    let note = "<p class=\"muted\">Sent counts from an output's first sample, also while nobody \
+        listens yet, and over both homes while they overlap. Lost: missing in the sequence. \
+        Fenced: of an old home, refused. Counters are read five times a second, so the last \
+        samples of an instance may be missing in them.</p>\n";
     section("Connections", &format!("{}{note}", table(&head, &rows)))
 }
 
