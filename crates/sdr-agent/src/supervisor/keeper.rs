@@ -1,11 +1,9 @@
 //! One task a process: from its start to its end, which is told exactly once.
 
 use std::io;
-use std::process::ExitStatus;
 use std::rc::Rc;
 
-use rustix::fd::OwnedFd;
-use rustix::process::{Pid, PidfdFlags, Signal, kill_process_group, pidfd_open};
+use rustix::process::Signal;
 use sdr_component::protocol::{
     Configure, ErrorReport, FromComponent, Hello, LineBuffer, Order, PROTOCOL_VERSION, StateReport,
     ToComponent,
@@ -16,21 +14,17 @@ use sdr_core::{
     lifecycle::LifecycleState,
     time::Instant,
 };
-use tokio::io::Interest;
-use tokio::io::unix::AsyncFd;
 use tokio::net::UnixStream;
 use tokio::sync::mpsc;
 
 use super::instance::{Life, Overdue};
-use super::launch::{self, Launched};
-use super::{Shared, logs, samples, socket};
+use super::process::Process;
+use super::{Shared, samples, socket};
 use crate::clock;
 use crate::trouble::Kind;
 
 /// Orders kept for a component that has not greeted yet.
 const PENDING_MAX: usize = 16;
-/// Lines of output that stand in the reason of an end.
-const LAST_LINES: usize = 5;
 
 /// What reaches a keeper.
 #[derive(Debug)]
@@ -53,9 +47,7 @@ pub(super) struct Greeting {
 pub(super) struct Keeper {
     shared: Rc<Shared>,
     order: LaunchOrder,
-    launched: Launched,
-    pid: Pid,
-    exit: AsyncFd<OwnedFd>,
+    process: Process,
     link: Option<Link>,
     life: Life,
     configured: bool,
@@ -85,62 +77,45 @@ impl Keeper {
         mut messages: mpsc::Receiver<Message>,
     ) {
         let instance = order.instance;
-        let started = launch::start(&shared.config, &order)
-            .map_err(|error| error.to_string())
-            .and_then(|launched| {
-                Self::new(Rc::clone(&shared), order, launched)
-                    .map_err(|error| format!("process cannot be watched: {error}"))
-            });
+        let started = Process::start(&shared.config, &order);
         match started {
-            Ok(mut keeper) => {
+            Ok(process) => {
+                let mut keeper = Self::new(Rc::clone(&shared), order, process);
                 keeper.announce().await;
                 keeper.watch(&mut messages).await;
                 keeper.bury().await;
             }
-            Err(reason) => {
+            Err(error) => {
+                let reason = error.to_string();
                 shared.kept.borrow_mut().remove(&instance);
                 shared.tell(instance, InstanceNews::LaunchFailed { reason }).await;
             }
         }
     }
 
-    fn new(shared: Rc<Shared>, order: LaunchOrder, mut launched: Launched) -> io::Result<Self> {
-        let pid = Pid::from_child(&launched.child);
-        let exit = pidfd_open(pid, PidfdFlags::empty())
-            .map_err(io::Error::from)
-            .and_then(|handle| AsyncFd::with_interest(handle, Interest::READABLE));
-        let exit = match exit {
-            Ok(exit) => exit,
-            Err(error) => {
-                launched.child.kill()?;
-                launched.child.wait()?;
-                return Err(error);
-            }
-        };
+    fn new(shared: Rc<Shared>, order: LaunchOrder, process: Process) -> Self {
         let now = clock::now();
         let life = Life::new(shared.config.patience, order.spec.execution, now);
-        Ok(Self {
+        Self {
             shared,
             order,
-            launched,
-            pid,
-            exit,
+            process,
             link: None,
             life,
             configured: false,
             pending: Vec::new(),
             turned_at: now,
-        })
+        }
     }
 
     /// The process runs: everybody who watches processes gets to know it.
     async fn announce(&self) {
         let (instance, component) = (self.order.instance, &self.order.component);
-        let pid = self.launched.child.id();
+        let pid = self.process.id();
         if let Some(kept) = self.shared.kept.borrow_mut().get_mut(&instance) {
             kept.pid = pid;
         }
-        let program = &self.launched.executable;
+        let program = &self.process.executable;
         self.shared.journal.add(component.to_string(), instance, pid, program);
         self.shared.outlets.watch.add(instance, pid, component);
         tracing::debug!(event = "started", %component, instance, pid);
@@ -165,7 +140,7 @@ impl Keeper {
     /// words are heard before its end.
     async fn turn(&mut self, messages: &mut mpsc::Receiver<Message>) -> Turn {
         let deadline = self.life.deadline();
-        let Self { link, exit, .. } = self;
+        let Self { link, process, .. } = self;
         let line = async {
             match link {
                 Some(link) => socket::receive(&link.stream, &mut link.buffer).await,
@@ -176,11 +151,7 @@ impl Keeper {
             biased;
             Some(message) = messages.recv() => Turn::Told(message),
             received = line => Turn::Received(received),
-            // An error of the reactor would mean that exits are not seen at all any more.
-            ready = exit.readable() => {
-                ready.expect("the reactor lives as long as its tasks").retain_ready();
-                Turn::Exited
-            }
+            () = process.ended() => Turn::Exited,
             () = clock::sleep_until(deadline) => Turn::TimePassed,
         }
     }
@@ -347,56 +318,22 @@ impl Keeper {
 
     fn terminate(&mut self, now: Instant) {
         self.life.terminated(now);
-        self.signal(Signal::TERM);
+        self.process.signal(Signal::TERM);
     }
 
     fn kill(&mut self, now: Instant) {
         self.life.killed(now);
-        self.signal(Signal::KILL);
-    }
-
-    /// The whole group: a component's children end with it.
-    fn signal(&self, signal: Signal) {
-        match kill_process_group(self.pid, signal) {
-            Ok(()) | Err(rustix::io::Errno::SRCH) => {}
-            Err(error) => {
-                tracing::error!(event = "not-signalled", pid = ?self.pid, ?signal, %error);
-            }
-        }
+        self.process.signal(Signal::KILL);
     }
 
     /// Reaps the process and says how it ended.
     async fn bury(mut self) {
-        // Before it is reaped: until then its number, and that of its group, are its own.
-        self.signal(Signal::KILL);
-        let how = match self.launched.child.wait() {
-            Ok(status) => describe(status),
-            Err(error) => format!("ended, status unknown: {error}"),
-        };
-        let last = logs::lines_at_end(&self.launched.log, self.launched.log_begin, LAST_LINES);
-        let reason = match last {
-            Ok((lines, _)) if !lines.trim().is_empty() => {
-                format!("{how}; last output: {}", lines.trim().replace('\n', " | "))
-            }
-            Ok(_) | Err(_) => how,
-        };
+        let reason = self.process.reap();
         let instance = self.order.instance;
         tracing::debug!(event = "ended", component = %self.order.component, instance, reason);
         self.shared.kept.borrow_mut().remove(&instance);
         self.shared.journal.remove(instance);
         self.shared.outlets.watch.remove(instance, &self.shared.outlets.record);
         self.shared.tell(instance, InstanceNews::Exited { reason }).await;
-    }
-}
-
-fn describe(status: ExitStatus) -> String {
-    use std::os::unix::process::ExitStatusExt as _;
-    match (status.code(), status.signal()) {
-        (Some(code), _) => format!("exit status {code}"),
-        (None, Some(number)) => match Signal::from_named_raw(number) {
-            Some(signal) => format!("killed by signal {number} ({signal:?})"),
-            None => format!("killed by signal {number}"),
-        },
-        (None, None) => format!("{status}"),
     }
 }

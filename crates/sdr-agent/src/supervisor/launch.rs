@@ -45,6 +45,9 @@ pub(crate) enum LaunchError {
         /// What the system said.
         source: io::Error,
     },
+    /// It runs no more: its end could not have been seen.
+    #[error("process cannot be watched: {0}")]
+    Watch(io::Error),
     /// The system refused.
     #[error("{}: {source}", path.display())]
     Spawn {

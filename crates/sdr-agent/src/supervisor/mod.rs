@@ -12,6 +12,7 @@ mod keeper;
 mod launch;
 mod leftovers;
 mod logs;
+mod process;
 mod samples;
 mod socket;
 

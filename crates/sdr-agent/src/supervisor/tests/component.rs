@@ -1,0 +1,112 @@
+//! The component's side of the protocol, by hand.
+
+use std::env;
+use std::io::{Read as _, Write as _};
+use std::os::unix::net::UnixStream;
+
+use sdr_component::protocol::{
+    Beat, Counters, ENV_COMPONENT, ENV_INSTANCE, ENV_ORPHAN_MS, ENV_SOCKET, FromComponent, Hello,
+    LineBuffer, Order, PROTOCOL_VERSION, StateReport, ToComponent, encode_line,
+};
+use sdr_core::{
+    lifecycle::LifecycleState,
+    order::Token,
+    recover::{Cause, Fault},
+    spec::ComponentProfile,
+};
+
+use super::key;
+
+/// Not a test: what `Bench::launch_component` starts.
+#[test]
+fn the_component_of_these_tests() {
+    let Ok(socket) = env::var(ENV_SOCKET) else { return };
+    assert_eq!(env::var(ENV_COMPONENT).unwrap(), key().to_string());
+    assert_eq!(env::var(ENV_ORPHAN_MS).unwrap(), "500");
+    let mut body = Body { stream: UnixStream::connect(socket).unwrap(), manner: String::new() };
+    body.say(&FromComponent::Hello(Box::new(hello())));
+    let mut buffer = LineBuffer::default();
+    let mut bytes = [0; 4096];
+    loop {
+        let length = body.stream.read(&mut bytes).unwrap();
+        if length == 0 {
+            return;
+        }
+        buffer.push(&bytes[..length]);
+        while let Some(message) = buffer.next_message::<ToComponent>().unwrap() {
+            body.hear(message);
+        }
+    }
+}
+
+fn hello() -> Hello {
+    let profile = ComponentProfile {
+        name: "tests".into(),
+        about: String::new(),
+        inputs: Vec::new(),
+        outputs: Vec::new(),
+        parameters: Vec::new(),
+    };
+    Hello {
+        v: PROTOCOL_VERSION,
+        component: key(),
+        instance: env::var(ENV_INSTANCE).unwrap().parse().unwrap(),
+        pid: std::process::id(),
+        profile,
+        now: report(LifecycleState::Created, None),
+    }
+}
+
+fn report(state: LifecycleState, token: Option<Token>) -> StateReport {
+    StateReport { state, token, fault: None }
+}
+
+/// The component's side of the protocol, by hand.
+struct Body {
+    stream: UnixStream,
+    manner: String,
+}
+
+impl Body {
+    fn say(&mut self, message: &FromComponent) {
+        self.stream.write_all(&encode_line(message).unwrap()).unwrap();
+    }
+
+    fn hear(&mut self, message: ToComponent) {
+        match message {
+            ToComponent::Configure(configure) => {
+                assert_eq!(configure.devices["wheels"], "/dev/wheels0");
+                self.manner = configure.parameters["manner"].to_string();
+                self.say(&FromComponent::State(report(LifecycleState::Inactive, None)));
+            }
+            ToComponent::Command(Order::Activate { token }) => self.activate(token),
+            ToComponent::Command(Order::Finish) if self.manner == "deaf" => {}
+            ToComponent::Command(Order::Finish) => std::process::exit(0),
+            ToComponent::Command(Order::Deactivate | Order::Reset) => {
+                let fault = Fault { cause: Cause::Error, reason: "worn out".into() };
+                let state = report(LifecycleState::Error, None);
+                self.say(&FromComponent::State(StateReport { fault: Some(fault), ..state }));
+            }
+            ToComponent::Reconfigure(_) => {}
+            ToComponent::Error(error) => {
+                // What the agent said is told by the last line of output.
+                eprintln!("{}", error.message);
+                std::process::exit(3);
+            }
+        }
+    }
+
+    fn activate(&mut self, token: Token) {
+        self.say(&FromComponent::State(report(LifecycleState::Active, Some(token))));
+        self.say(&FromComponent::Beat(Beat::default()));
+        self.say(&FromComponent::Counters(Counters::default()));
+        match self.manner.as_str() {
+            "garbage" => self.stream.write_all(b"{\"type\":\"sing\"}\n").unwrap(),
+            "crash" => {
+                eprintln!("the lidar is on fire");
+                std::process::exit(101);
+            }
+            _ => {}
+        }
+    }
+}
