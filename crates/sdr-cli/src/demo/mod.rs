@@ -19,6 +19,7 @@ mod system;
 mod watch;
 
 use std::{
+    cell::Cell,
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -61,6 +62,8 @@ struct Plan {
     ballast: bool,
     images: Option<PathBuf>,
     keep: bool,
+    /// The fleet was left up as wished: the signal that ends it is no failure.
+    up: Cell<bool>,
 }
 
 impl DemoArgs {
@@ -74,7 +77,7 @@ impl DemoArgs {
             None => free_folder(Path::new("."))?,
         };
         let (coordinator, ballast) = (self.coordinator, !self.no_ballast);
-        Ok(Plan { out, coordinator, ballast, images, keep: self.keep })
+        Ok(Plan { out, coordinator, ballast, images, keep: self.keep, up: Cell::new(false) })
     }
 }
 
@@ -85,9 +88,12 @@ pub(crate) async fn run(args: DemoArgs, session: &Session) -> Result<ExitCode, F
     let stopped = stop_signal()?;
     tokio::select! {
         ended = story::play(&plan, session) => ended,
-        word = stopped => Err(Failure::new(format!(
-            "the demo was stopped ({word}); nothing is left behind"
-        ))),
+        word = stopped => match plan.up.get() {
+            true => Ok(ExitCode::SUCCESS),
+            false => Err(Failure::new(format!(
+                "the demo was stopped ({word}); nothing is left behind"
+            ))),
+        },
     }
 }
 

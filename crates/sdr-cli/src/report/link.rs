@@ -50,7 +50,7 @@ impl Link {
     pub(crate) fn heard_ns(&self, epoch: u64) -> Option<u64> {
         let knows = |sample: &&ConnectionSample| sample.epoch >= epoch && sample.last_ns > 0;
         let sample = self.samples.iter().find(knows)?;
-        let mut before = self.samples.iter().any(|other| {
+        let before = self.samples.iter().any(|other| {
             other.robot == sample.robot
                 && other.monotonic_ns < sample.monotonic_ns
                 && other.first_ns == sample.first_ns

@@ -1,5 +1,8 @@
 //! The five steps, each with what it waits for and for how long at most.
 
+mod state;
+mod wait;
+
 use std::{
     path::{Path, PathBuf},
     process::ExitCode,
@@ -7,12 +10,13 @@ use std::{
 };
 
 use sdr_core::{
-    api::{DeployAnswer, DeployRequest, SystemView},
+    api::{DeployAnswer, DeployRequest},
     spec::SystemSpec,
 };
 use sdr_lab::world::monotonic_ns;
 use serde::Deserialize;
 
+use self::state::{has_moved, is_up, progress};
 use super::{
     Plan,
     board::{Board, Step},
@@ -20,14 +24,13 @@ use super::{
     fleet::{Fleet, Folder},
     stage::{DRIVEN, FADING, Stage},
     system::{self, Available},
-    watch::{LOOK_EVERY, Watch},
+    watch::Watch,
 };
 use crate::{
     Session,
     failure::Failure,
     locate,
     output::Format,
-    render::status::{is_active, problems, screen},
     report::{
         Report,
         extra::{self, Bars, Coordinator, Extra},
@@ -67,15 +70,15 @@ pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Fai
     story.drive().await?;
     story.fade().await?;
     let report = story.report(&spec).await?;
-    if plan.keep {
-        // The signal that ends the demo drops this.
-        return std::future::pending().await;
+    match session.output.format() {
+        Format::Json => session.output.json(&report.summary)?,
+        Format::Text if plan.keep => {}
+        Format::Text => session.output.line(&ending::further())?,
     }
-    drop(story);
-    if session.output.format() == Format::Json {
-        session.output.json(&report.summary)?;
-    } else {
-        session.output.line(&ending::further())?;
+    if plan.keep {
+        plan.up.set(true);
+        // The signal that ends the demo drops this, and the story with it.
+        return std::future::pending().await;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -260,56 +263,6 @@ impl Story<'_> {
         }
     }
 
-    /// Looks again and again until `done` gives something; too late or with an agent gone it fails
-    /// and says what was awaited, the last status and what the agents wrote last.
-    async fn wait<T>(
-        &mut self,
-        limit: Duration,
-        mut done: impl FnMut(&mut Self) -> Option<T>,
-    ) -> Result<T, Failure> {
-        let since = Instant::now();
-        loop {
-            self.watch.look(&self.fleet).await;
-            let found = done(self);
-            self.board.show(self.session, &self.watch)?;
-            if let Some(found) = found {
-                return Ok(found);
-            }
-            let ended = self.fleet.agents.iter_mut().find_map(|agent| {
-                agent.ended().map(|status| format!("the agent of {} ended ({status})", agent.robot))
-            });
-            if let Some(ended) = ended {
-                return Err(self.failed(&ended));
-            }
-            if since.elapsed() >= limit {
-                return Err(self.failed(&format!("not within {} s", limit.as_secs())));
-            }
-            tokio::time::sleep(LOOK_EVERY).await;
-        }
-    }
-
-    async fn let_pass(&mut self, time: Duration) -> Result<(), Failure> {
-        let until = Instant::now() + time;
-        self.wait(time + Duration::from_secs(20), |story| {
-            if story.board.step() == Step::Drive {
-                let text = story.driven();
-                story.board.doing(text);
-            }
-            (Instant::now() >= until).then_some(())
-        })
-        .await
-    }
-
-    async fn wait_for_motion(&mut self, wanted: bool) -> Result<(), Failure> {
-        self.wait(Duration::from_secs(20), |story| {
-            let text = story.driven();
-            story.board.doing(text);
-            let rover = story.stage.driven()?;
-            (rover.driving == wanted).then_some(())
-        })
-        .await
-    }
-
     /// `3.1 m, stopped 1 time`.
     fn driven(&self) -> String {
         match self.stage.driven() {
@@ -334,47 +287,6 @@ impl Story<'_> {
         let bar = BARS.recovery_rssi_dbm;
         format!("{FADING} at {level}, bar {bar:.1} dBm{}", held.unwrap_or_default())
     }
-
-    /// Everything a person needs to see what went wrong.
-    fn failed(&self, what: &str) -> Failure {
-        let mut lines = vec![format!("awaited in vain ({what}): {}", self.board.awaited())];
-        if let Some(status) = self.watch.any() {
-            lines.push(format!("last status, seen from {}:", status.seen_from));
-            let screen = screen(status, &problems(status), 100);
-            lines.extend(screen.into_iter().map(|line| format!("  {line}")));
-        }
-        for (robot, reason) in &self.watch.unanswered {
-            lines.push(format!("{robot} does not answer: {reason}"));
-        }
-        for agent in &self.fleet.agents {
-            lines.push(format!("last lines of the agent of {}:", agent.robot));
-            let last = agent.last_lines(8).into_iter();
-            lines.extend(last.map(|line| format!("  {}", crate::render::units::one_line(&line))));
-        }
-        Failure::new(lines.join("\n"))
-    }
-}
-
-/// `3 of 5 active, 2 of 5 connections heard`.
-fn progress(system: Option<&SystemView>) -> String {
-    let Some(system) = system else { return "accepted, to be placed".to_owned() };
-    let active = system.components.iter().filter(|component| is_active(component)).count();
-    let heard = system.connections.iter().filter(|connection| connection.heard).count();
-    let (components, connections) = (system.components.len(), system.connections.len());
-    format!("{active} of {components} active, {heard} of {connections} connections heard")
-}
-
-fn is_up(system: &SystemView) -> bool {
-    system.components.iter().all(is_active) && system.connections.iter().all(|one| one.heard)
-}
-
-/// Whether what should leave has left and everything is up again.
-fn has_moved(system: &SystemView) -> bool {
-    let left = |name: &str| {
-        let component = system.components.iter().find(|component| component.name == name);
-        component.is_some_and(|one| one.home.as_deref().is_some_and(|home| home != FADING))
-    };
-    MOVED.iter().all(|name| left(name)) && is_up(system)
 }
 
 /// Copies a recording into the folder of reports.
@@ -385,30 +297,4 @@ fn copy(recording: &Path, out: &Path) -> Result<PathBuf, Failure> {
         Failure::new(format!("cannot copy {} to {}: {error}", recording.display(), to.display()))
     })?;
     Ok(to)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{super::ROBOTS, *};
-    use crate::render::fixture;
-
-    #[test]
-    fn the_move_is_done_when_both_left_and_all_is_up() {
-        let mut system = fixture::exploration();
-        assert!(has_moved(&system) && is_up(&system));
-        system.connections[1].heard = false;
-        assert!(!has_moved(&system));
-        system.connections[1].heard = true;
-        system.components[1].home = Some(FADING.to_owned());
-        assert!(!has_moved(&system));
-        assert!(ROBOTS.contains(&RECEIVER) && ROBOTS.contains(&WITNESS));
-    }
-
-    #[test]
-    fn progress_counts_components_and_connections() {
-        let mut system = fixture::exploration();
-        system.components[0].state = None;
-        assert_eq!(progress(Some(&system)), "4 of 5 active, 5 of 5 connections heard");
-        assert_eq!(progress(None), "accepted, to be placed");
-    }
 }
