@@ -153,7 +153,7 @@ fn a_robot_that_cannot_store_refuses_and_says_so() {
     fleet.deploy(0, &single(100));
     fleet.run(Duration::from_secs(2));
     assert!(fleet.robots[0].answers[0].as_ref().unwrap_err().contains("no space left"));
-    assert!(!fleet.events("store-failed").is_empty());
+    assert!(!fleet.events("minting-paused").is_empty());
 
     fleet.robots[0].disk_broken = false;
     fleet.run(Duration::from_secs(3));

@@ -35,7 +35,8 @@ fn a_fading_radio_moves_both_components_together_to_the_relaxed_home() {
     assert_eq!(fleet.home("exploration", "anomaly").as_deref(), Some("robot-3"));
     let fisheye = fleet.component("exploration", "fisheye").unwrap();
     assert_eq!(fisheye.epoch, 2);
-    assert!(fisheye.reason.contains("310 MB left (relaxed tier)"), "{}", fisheye.reason);
+    let anomaly = fleet.component("exploration", "anomaly").unwrap();
+    assert!(anomaly.reason.contains("310 MB left (relaxed tier)"), "{}", anomaly.reason);
     for stays in ["camera", "controller", "position"] {
         assert_eq!(fleet.component("exploration", stays).unwrap().epoch, 1);
     }
