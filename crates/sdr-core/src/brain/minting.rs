@@ -105,7 +105,7 @@ impl Brain {
     pub(super) fn handle_stored(&mut self, ticket: StoreTicket) {
         self.desk.spoken = true;
         if self.desk.broken_at.take().is_some() {
-            self.event("store-works-again", "");
+            self.event("minting-resumed", "the disk takes what is decided again");
         }
         if self.desk.in_flight == Some(ticket) {
             self.desk.in_flight = None;
@@ -142,7 +142,7 @@ impl Brain {
                 self.effects.push_back(Effect::Answer { request, result: Err(text) });
             }
         }
-        self.event("store-failed", String::from(reason));
+        self.event("minting-paused", String::from(reason));
         self.plans.pause(self.handled_at);
         self.desk.dirty = true;
     }

@@ -73,7 +73,6 @@ pub struct Brain {
     effects: VecDeque<Effect>,
     started_at: Instant,
     handled_at: Instant,
-    joined_at: Option<Instant>,
 
     systems: BTreeMap<Name, SystemNow>,
     instances: BTreeMap<InstanceId, Instance>,
@@ -133,7 +132,6 @@ impl Brain {
             effects: VecDeque::new(),
             started_at: now,
             handled_at: now,
-            joined_at: None,
             systems: BTreeMap::new(),
             instances: BTreeMap::new(),
             instance_last: 0,
@@ -252,7 +250,6 @@ impl Brain {
                     refresh |= systems::shapes_systems(key.kind);
                 }
                 MeshNews::Alive(robot) => {
-                    self.joined_at.get_or_insert(now);
                     let text = alloc::format!("{robot} is heard");
                     self.event("robot-alive", text);
                     self.plans.retry_soon();
@@ -271,16 +268,14 @@ impl Brain {
         }
     }
 
-    /// Whether this robot may start what it remembers: it has merged with a peer, or waited
+    /// Whether this robot may start what it remembers: it is in step with a peer, or waited
     /// for one long enough.
     fn may_begin(&self, now: Instant) -> bool {
-        let merged = self.joined_at.is_some_and(|at| now >= at + self.config.gossip_period * 2);
         let alone = self.config.seeds.iter().all(|seed| Some(*seed) == self.config.listen);
-        merged || alone || now >= self.begin_deadline()
+        self.mesh.is_in_step() || alone || now >= self.begin_deadline()
     }
 
     fn begin_deadline(&self) -> Instant {
-        let waited = self.started_at + self.config.rejoin_wait;
-        self.joined_at.map_or(waited, |at| waited.min(at + self.config.gossip_period * 2))
+        self.started_at + self.config.rejoin_wait
     }
 }

@@ -45,6 +45,7 @@ impl Mesh {
         let mut answer = Vec::new();
         let mut anything = false;
         let robot = datagram.from;
+        let greeted = datagram.sections.iter().any(|part| matches!(part, Section::Ping(_)));
         for section in datagram.sections {
             anything |= match section {
                 Section::Ping(number) => {
@@ -55,7 +56,7 @@ impl Mesh {
                 Section::AuthorDigest(digest) => self.compare(now, digest, &mut answer),
                 Section::AuthorDelta(delta) => self.learn(now, &delta, &mut answer),
                 Section::FleetDigest(theirs) => {
-                    self.compare_buckets(&theirs, &mut answer);
+                    self.compare_buckets(&theirs, greeted, &mut answer);
                     false
                 }
                 Section::FleetBucket(piece) => self.answer_piece(&piece, &mut answer),
@@ -185,8 +186,14 @@ impl Mesh {
         }
     }
 
-    fn compare_buckets(&self, theirs: &[u32], answer: &mut Vec<Section>) {
+    /// Asks for what differs; when nothing does, both ends know that they are in step.
+    fn compare_buckets(&mut self, theirs: &[u32], greeted: bool, answer: &mut Vec<Section>) {
         let ours = self.fleet.digest();
+        if ours == theirs {
+            self.in_step = true;
+            answer.extend(greeted.then_some(Section::FleetDigest(ours)));
+            return;
+        }
         for (bucket, (our, their)) in ours.iter().zip(theirs).enumerate() {
             if our != their {
                 let pieces = self.fleet.pieces(bucket, false, PIECE_ENTRIES_MAX);

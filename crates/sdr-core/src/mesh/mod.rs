@@ -104,6 +104,7 @@ pub struct Mesh {
     heartbeat: u64,
     /// Own records up to this one were pushed.
     pushed: u64,
+    in_step: bool,
     authors: AuthorTable,
     fleet: FleetTable,
     liveness: Liveness,
@@ -136,6 +137,7 @@ impl Mesh {
             own,
             heartbeat: 0,
             pushed: 0,
+            in_step: false,
             fleet,
             round_at: now,
             outbox: VecDeque::new(),
@@ -240,6 +242,12 @@ impl Mesh {
     /// Whether fresh news of `robot` arrives; always of this robot.
     pub fn is_alive(&self, robot: &RobotId) -> bool {
         *robot == self.config.robot || self.liveness.is_alive(robot)
+    }
+
+    /// Whether some other robot held the very same fleet table at least once since the start:
+    /// what this robot missed while it was away is known by now.
+    pub fn is_in_step(&self) -> bool {
+        self.in_step
     }
 
     /// Age of the last fresh news of `robot`.
