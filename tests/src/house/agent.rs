@@ -8,7 +8,7 @@ use std::{
     process::{Child, Command, Output, Stdio},
 };
 
-use rustix::process::{Pid, Signal, kill_process, test_kill_process};
+use rustix::process::{Pid, Signal, kill_process};
 use sdr_core::api::{EventView, StatusView};
 use sdr_lab::world::RobotPaths;
 
@@ -195,10 +195,11 @@ impl Drop for Agent {
     }
 }
 
-/// Whether a process of this id exists.
+/// Whether a process of this id runs; one that ended and was not collected yet does not.
 pub fn is_running(pid: u32) -> bool {
-    let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
-    pid.is_some_and(|pid| test_kill_process(pid).is_ok())
+    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    // pid (name) state ...; the name may hold anything
+    stat.rsplit_once(") ").is_some_and(|(_, rest)| !rest.starts_with(['Z', 'X']))
 }
 
 /// Ends a process at once, as a crash would.

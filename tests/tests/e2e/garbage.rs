@@ -51,7 +51,7 @@ fn a_corrupt_state_file_is_kept_aside_and_the_mesh_tells_the_rest() {
         let path = state.join(name);
         let mut bytes = fs::read(&path).ok()?;
         let middle = bytes.len() / 2;
-        bytes[middle] ^= 0x55;
+        *bytes.get_mut(middle)? ^= 0x55;
         fs::write(&path, bytes).ok()
     };
     let names: Vec<String> = fs::read_dir(&state)
