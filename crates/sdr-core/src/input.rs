@@ -1,6 +1,6 @@
 //! Everything the brain can be told.
 
-use alloc::{string::String, vec::Vec};
+use alloc::{boxed::Box, string::String, vec::Vec};
 use core::net::SocketAddr;
 
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
     lifecycle::LifecycleState,
     order::Token,
     recover::Cause,
-    report::{HostReport, Usage},
+    report::{HostReport, RobotFacts, Usage},
     spec::SystemSpec,
 };
 
@@ -36,6 +36,8 @@ pub enum Input {
     },
     /// A fresh sample of the host's figures, 5 to 10 times a second.
     Host(HostReport),
+    /// The body or its limits changed, such as the executables that can be launched.
+    Facts(Box<RobotFacts>),
     /// Fresh figures of instances.
     Usage(Vec<(InstanceId, Usage)>),
     /// News of an instance.

@@ -173,6 +173,11 @@ impl Brain {
                 self.host = Some(host);
                 self.judge_due = true;
             }
+            Input::Facts(facts) => {
+                self.config.facts = *facts;
+                self.say_facts();
+                self.plans.retry_soon();
+            }
             Input::Usage(figures) => self.handle_usage(figures),
             Input::Instance { instance, news } => self.handle_instance(now, instance, news),
             Input::Route { path, matched } => {

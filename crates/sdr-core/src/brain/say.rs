@@ -69,7 +69,7 @@ impl Said {
 impl Brain {
     pub(super) fn say_facts(&mut self) {
         let facts = self.config.facts.clone();
-        self.mesh.report(&Report::Facts(facts), Push::WithGossip);
+        self.mesh.report(&Report::Facts(facts), Push::Now);
     }
 
     pub(super) fn say(&mut self, now: Instant) {
