@@ -80,7 +80,11 @@ impl Brain {
                 true
             }
             Err(error) => {
-                self.event("policy-unreadable", format!("recovery `{}`: {error}", policy.name));
+                let text = format!("recovery `{}`: {error}", policy.name);
+                let told = self.unreadable.insert(name.clone(), policy);
+                if told.as_ref() != self.unreadable.get(name) {
+                    self.event("policy-unreadable", text);
+                }
                 false
             }
         }

@@ -84,6 +84,8 @@ pub struct Brain {
     host: Option<HostReport>,
     said: Said,
     engines: BTreeMap<Name, Engine>,
+    /// Recovery policies that could not be read; each is told once.
+    unreadable: BTreeMap<Name, crate::spec::PolicyBytes>,
     faults: BTreeMap<ComponentKey, Fault>,
     conditions: BTreeMap<(Name, Cause), ConditionReport>,
     restarts: BTreeMap<ComponentKey, RestartPlan>,
@@ -141,6 +143,7 @@ impl Brain {
             host: None,
             said: Said::default(),
             engines: BTreeMap::new(),
+            unreadable: BTreeMap::new(),
             faults: BTreeMap::new(),
             conditions: BTreeMap::new(),
             restarts: BTreeMap::new(),
