@@ -31,6 +31,7 @@ pub(super) struct Tape {
     sequence: u32,
     /// Wall time less monotonic time at the start: log times never jump with the wall clock.
     wall_offset_ns: u64,
+    log_time_last_ns: u64,
     bytes: u64,
 }
 
@@ -72,6 +73,7 @@ impl Tape {
             channels: HashMap::new(),
             sequence: 0,
             wall_offset_ns: wall.saturating_sub(clock::now().as_nanos()),
+            log_time_last_ns: 0,
             bytes: 0,
         };
         tape.flush()?;
@@ -90,9 +92,12 @@ impl Tape {
             None => self.add_channel(line)?,
         };
         self.sequence = self.sequence.wrapping_add(1);
-        let log_time = self.wall_offset_ns.saturating_add(line.monotonic_ns);
-        let header =
-            MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
+        let publish_time = self.wall_offset_ns.saturating_add(line.monotonic_ns);
+        // Threads overtake each other on their way here, and readers refuse a file without an
+        // index whose log times go back.
+        let log_time = publish_time.max(self.log_time_last_ns);
+        self.log_time_last_ns = log_time;
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time };
         self.bytes += line.cdr.len() as u64;
         self.writer.write_to_known_channel(&header, &line.cdr)
     }

@@ -80,6 +80,26 @@ fn a_recording_is_readable_while_it_is_written() {
 }
 
 #[test]
+fn log_times_never_go_back_and_publish_times_are_true() {
+    let dir = tempfile::tempdir().unwrap();
+    let recorder = Recorder::start(dir.path(), &robot(), u64::MAX, |_| {}).unwrap();
+
+    for at in [5_000, 3_000, 4_000, 9_000] {
+        recorder.sender().record(at, &metrics(at));
+    }
+
+    let bytes = fs::read(recorder.flusher().flush()).unwrap();
+    let times: Vec<_> = MessageStream::new(&bytes)
+        .unwrap()
+        .map(|message| message.map(|message| (message.log_time, message.publish_time)).unwrap())
+        .collect();
+    let from_first = |time: u64| time + 5_000 - times[0].1;
+    let found: Vec<_> =
+        times.iter().map(|(log, publish)| (from_first(*log), from_first(*publish))).collect();
+    assert_eq!(found, [(5_000, 5_000), (5_000, 3_000), (5_000, 4_000), (9_000, 9_000)]);
+}
+
+#[test]
 fn a_full_recording_stops_and_says_so() {
     let dir = tempfile::tempdir().unwrap();
     let news = Arc::new(Mutex::new(Vec::new()));
