@@ -130,27 +130,3 @@ fn a_place_that_cannot_work_is_refused_before_anything_is_made() {
     let wide = SharedMemory { prefix: "p".repeat(13), root: PathBuf::from("/dev/shm/x") };
     assert!(matches!(Memory::open(&wide, "t"), Err(ShmError::PrefixTooLong { .. })));
 }
-
-/// What a port costs with these limits; run by hand: `cargo test -- --ignored --nocapture cost`.
-#[test]
-#[ignore = "a measurement, not a claim"]
-fn cost_of_a_port() {
-    let place = Place::new();
-    let memory = Memory::open(&place.memory, "test").unwrap();
-    let rss = || {
-        let text = std::fs::read_to_string("/proc/self/status").unwrap();
-        text.lines().filter(|line| line.starts_with("Rss")).collect::<Vec<_>>().join(" ")
-    };
-    println!("before {}", rss());
-    let start = std::time::Instant::now();
-    let mut ports = Vec::new();
-    for index in 0..20 {
-        let path = format!("s/c/p{index}");
-        ports.push((memory.publisher(&path, 8, 64).unwrap(), memory.subscriber(&path, 8).unwrap()));
-    }
-    println!("20 pairs in {:?}; {}", start.elapsed(), rss());
-    for (publisher, _) in &ports {
-        send(publisher, 1, &[0; 60_000]);
-    }
-    println!("each sent 60 kB: {}", rss());
-}
