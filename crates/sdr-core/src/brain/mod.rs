@@ -236,6 +236,8 @@ impl Brain {
         self.reconcile(now);
         if self.judge_due || self.engines.values().any(|engine| engine.is_due(now)) {
             self.judge(now);
+            // a coordinator in trouble of its own helps itself without waiting for the next input
+            self.decide(now);
             self.reconcile(now);
         }
         self.say(now);
