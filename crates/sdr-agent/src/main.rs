@@ -15,6 +15,7 @@ mod config;
 mod data;
 mod effects;
 mod events;
+mod installed;
 mod memory;
 mod mesh;
 mod metrics;
@@ -39,8 +40,8 @@ use sdr_files::robot::{LogFormat, Places};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 use tokio::task::LocalSet;
-use tracing_subscriber::EnvFilter;
 use tracing_subscriber::filter::ParseError;
+use tracing_subscriber::{Layer, filter::Targets, layer::SubscriberExt, util::SubscriberInitExt};
 
 use world::World;
 
@@ -117,12 +118,13 @@ fn stop_signals() -> io::Result<watch::Receiver<bool>> {
 
 fn start_log(robot: &RobotConfig) -> Result<(), ParseError> {
     let level = std::env::var("RUST_LOG").unwrap_or_else(|_| robot.log.level.clone());
-    let filter = EnvFilter::try_new(level)?;
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr);
-    match robot.log.format {
-        LogFormat::Text => log.with_ansi(rustix::termios::isatty(io::stderr())).init(),
-        LogFormat::Json => log.json().init(),
-    }
+    let filter: Targets = level.parse()?;
+    let layer = tracing_subscriber::fmt::layer().with_writer(io::stderr);
+    let layer = match robot.log.format {
+        LogFormat::Text => layer.with_ansi(rustix::termios::isatty(io::stderr())).boxed(),
+        LogFormat::Json => layer.json().boxed(),
+    };
+    tracing_subscriber::registry().with(layer).with(filter).init();
     Ok(())
 }
 
