@@ -1,4 +1,5 @@
 //! All tests over the whole house, in one binary.
+#![expect(clippy::unwrap_used, reason = "a test ends at the first surprise, helpers included")]
 
 mod brain;
 mod e2e;

@@ -1,23 +1,42 @@
 //! The main job, end to end.
 
 use std::{
+    collections::BTreeSet,
     path::{Path, PathBuf},
     process::{Command, Stdio},
 };
 
 use rustix::process::{Pid, Signal, kill_process};
-use sdr_tests::house::{LIMIT, programs, wait_for};
+use sdr_tests::house::{LIMIT, is_running, programs, wait_for};
 use serde_json::Value;
 
 const FIVE: [&str; 5] = ["fisheye", "anomaly", "camera", "controller", "position"];
 
-/// The shared memory of agents that exist now.
-fn shared_memory() -> Vec<PathBuf> {
-    let list = |folder: &str| {
-        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-        entries.map(|entry| entry.path()).collect::<Vec<_>>()
-    };
-    list("/dev/shm/sdr")
+/// Processes whose environment names `folder`: all that a demo with this TMPDIR started.
+fn processes_of(folder: &Path) -> Vec<u32> {
+    let words = folder.to_string_lossy().into_owned();
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    entries
+        .filter_map(|entry| entry.file_name().to_string_lossy().parse().ok())
+        .filter(|pid| {
+            let environment = std::fs::read(format!("/proc/{pid}/environ")).unwrap_or_default();
+            is_running(*pid) && String::from_utf8_lossy(&environment).contains(&words)
+        })
+        .collect()
+}
+
+/// Files of shared memory that these processes hold.
+fn shared_memory_of(pids: &[u32]) -> BTreeSet<PathBuf> {
+    let held = pids.iter().flat_map(|pid| {
+        let maps = std::fs::read_to_string(format!("/proc/{pid}/maps")).unwrap_or_default();
+        let mapped: Vec<PathBuf> = maps
+            .lines()
+            .filter_map(|line| line.find("/dev/shm/").map(|at| PathBuf::from(&line[at..])))
+            .collect();
+        let opened = std::fs::read_dir(format!("/proc/{pid}/fd")).into_iter().flatten().flatten();
+        mapped.into_iter().chain(opened.filter_map(|entry| std::fs::read_link(entry.path()).ok()))
+    });
+    held.filter(|path| path.starts_with("/dev/shm") && path.exists()).collect()
 }
 
 /// Where the Python tests find the recordings of this run.
@@ -30,10 +49,11 @@ fn recordings() -> PathBuf {
 fn the_demo_places_five_moves_two_and_reports() {
     let out = recordings();
     let _ = std::fs::remove_dir_all(&out);
-    let before = shared_memory();
+    let temporary = tempfile::tempdir().unwrap();
     let output = Command::new(programs().sdr())
         .args(["demo", "--no-ballast", "--coordinator", "robot-2", "-o", "json", "--out"])
         .arg(&out)
+        .env("TMPDIR", temporary.path())
         .output()
         .unwrap();
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -53,9 +73,8 @@ fn the_demo_places_five_moves_two_and_reports() {
     assert_eq!(report["agents"].as_object().unwrap().len(), 3);
     assert!(report["controller_gap_ms"].is_object(), "{report:#}");
     check_files(&out, &report);
-    for left in shared_memory() {
-        assert!(before.contains(&left), "{} was left behind", left.display());
-    }
+    assert_eq!(processes_of(temporary.path()), Vec::<u32>::new());
+    assert_eq!(std::fs::read_dir(temporary.path()).unwrap().count(), 0);
 }
 
 fn check_files(out: &Path, report: &Value) {
@@ -82,18 +101,23 @@ fn an_interrupted_demo_leaves_nothing_behind() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let before = shared_memory();
-    let up = wait_for(LIMIT, || shared_memory().len() >= before.len() + 3);
-    assert!(up, "the fleet never came up");
-    let ours: Vec<PathBuf> =
-        shared_memory().into_iter().filter(|path| !before.contains(path)).collect();
+    let mut pids = Vec::new();
+    let mut memory = BTreeSet::new();
+    let up = wait_for(LIMIT, || {
+        pids = processes_of(temporary.path());
+        memory = shared_memory_of(&pids);
+        // the demo, three agents, five components
+        pids.len() >= 9 && !memory.is_empty()
+    });
+    assert!(up, "the fleet never came up: {pids:?} {memory:?}");
 
     kill_process(Pid::from_child(&demo), Signal::INT).unwrap();
 
     let ended = wait_for(LIMIT, || matches!(demo.try_wait(), Ok(Some(_))));
     assert!(ended, "the demo did not end");
-    let left: Vec<&PathBuf> = ours.iter().filter(|path| path.exists()).collect();
-    // other tests of this machine come and go: only what this demo made counts
-    assert!(left.len() < 3, "left behind: {left:?}");
+    let lives: Vec<&u32> = pids.iter().filter(|pid| is_running(**pid)).collect();
+    assert!(lives.is_empty(), "processes left behind: {lives:?}");
+    let left: Vec<&PathBuf> = memory.iter().filter(|path| path.exists()).collect();
+    assert!(left.is_empty(), "shared memory left behind: {left:?}");
     assert_eq!(std::fs::read_dir(temporary.path()).unwrap().count(), 0);
 }
