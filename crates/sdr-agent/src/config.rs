@@ -7,14 +7,13 @@ use std::path::PathBuf;
 use rand::TryRngCore as _;
 use rand::rngs::OsRng;
 use sdr_component::protocol::SharedMemory;
-use sdr_core::{
-    brain::BrainConfig, order::hash64, report::RobotFacts, spec::launch_hash, units::Bytes,
-};
+use sdr_core::{brain::BrainConfig, order::hash64, report::RobotFacts, units::Bytes};
 use sdr_files::RobotConfig;
 use sdr_files::robot::{BatterySource, PositionSource, RssiSource};
 
+use crate::installed;
 use crate::metrics::{MetricsConfig, Radio, Sensors, host};
-use crate::supervisor::{LogFiles, Patience, SupervisorConfig, executables};
+use crate::supervisor::{LogFiles, Patience, SupervisorConfig};
 
 /// Where Linux shows wireless interfaces.
 const WIRELESS: &str = "/proc/net/wireless";
@@ -46,15 +45,12 @@ pub(crate) fn memory_capacity(config: &RobotConfig) -> Bytes {
 
 /// The brain's, but for where the mesh listens.
 pub(crate) fn brain(config: &RobotConfig) -> BrainConfig {
-    let mut launchables: Vec<u32> =
-        executables(&component_path(config)).iter().map(|name| launch_hash(name)).collect();
-    launchables.sort_unstable();
     let facts = RobotFacts {
         memory_capacity: memory_capacity(config),
         cpu_capacity: config.capacity.cpu.unwrap_or_else(host::cpu),
         labels: config.labels.clone(),
         devices: config.devices.iter().map(|device| device.name.clone()).collect(),
-        launchables,
+        launchables: installed::launchables(&component_path(config)),
         role: config.coordinator,
         api: config.api.socket.display().to_string(),
         version: env!("CARGO_PKG_VERSION").into(),

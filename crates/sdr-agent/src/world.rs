@@ -21,6 +21,7 @@ use crate::api::{self, AnswerDesk, Api, ApiError, ApiState, LatestPlan, Profiles
 use crate::data::{Data, DataConfig, DataError, TapSink};
 use crate::effects::Effects;
 use crate::events::Events;
+use crate::installed::Installed;
 use crate::mesh::udp::Mesh;
 use crate::metrics::{Metrics, Watch};
 use crate::record::{self, RecordSender, Recorder, RecorderNews};
@@ -114,6 +115,8 @@ impl World {
             .map_err(|source| StartError::Mesh { address, source })?;
         let mut brain_config = config::brain(robot);
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
+        let facts = brain_config.facts.clone();
+        let installed = Installed::new(config::component_path(robot), facts, sender.clone());
         let seams = Seams { recovery: Box::new(sdr_recovery::make) };
         let brain = Brain::new(brain_config, seams, ground.stored, clock::now());
 
@@ -146,10 +149,12 @@ impl World {
             trouble,
             plan: plan.clone(),
             logs,
+            installed: installed.clone(),
             recording: ground.recorder.as_ref().map(Recorder::flusher),
             profiles: Profiles::new(config::component_path(robot)),
         };
         let api = Api::start(robot.api.socket.clone(), listener, api_state);
+        installed.watch();
         let events = ground.events;
         let effects = Effects { mesh, store, supervisor, data, desk, events, plan, inputs: sender };
         let world = Self {

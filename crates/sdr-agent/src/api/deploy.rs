@@ -15,6 +15,7 @@ use sdr_core::{
 
 use super::answer::Refusal;
 use super::{ApiState, BODY_BYTES_MAX};
+use crate::installed::{Look, LoopEnded};
 
 /// How long the brain and the disk have to accept a system.
 const ANSWER_MAX: Duration = Duration::from_secs(10);
@@ -37,6 +38,8 @@ pub(super) async fn deploy(
         let error = format!("system `{}`: {error}", request.system.name);
         return Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, error));
     }
+    // What was installed a moment ago counts.
+    state.installed.refresh(Look::Thorough).await.map_err(|LoopEnded| Refusal::stopping())?;
     ask(&state, |request_id| Input::Deploy { request: request_id, system: request.system }).await
 }
 

@@ -27,6 +27,7 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 
 use crate::events::Events;
+use crate::installed::Installed;
 use crate::record::Flusher;
 use crate::supervisor::LogFiles;
 use crate::trouble::Trouble;
@@ -50,6 +51,7 @@ pub(crate) struct ApiState {
     pub(crate) trouble: Trouble,
     pub(crate) plan: LatestPlan,
     pub(crate) logs: LogFiles,
+    pub(crate) installed: Installed,
     /// `None` when nothing is recorded.
     pub(crate) recording: Option<Flusher>,
     pub(crate) profiles: Profiles,

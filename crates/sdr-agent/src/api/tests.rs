@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::*;
+use crate::installed::tests::facts;
 
 struct Bench {
     dir: TempDir,
@@ -26,8 +27,10 @@ impl Bench {
         let events = Events::new(robot.clone());
         let (sender, inputs) = mpsc::channel(16);
         let (asker, questions) = mpsc::channel(16);
+        let bin = vec![dir.path().join("bin")];
         let state = ApiState {
             robot,
+            installed: Installed::new(bin.clone(), facts(), sender.clone()),
             inputs: sender,
             questions: asker,
             desk: AnswerDesk::default(),
@@ -36,7 +39,7 @@ impl Bench {
             plan: LatestPlan::default(),
             logs: LogFiles { dir: dir.path().into(), each_bytes_max: 1 << 20, bytes_max: 1 << 20 },
             recording: None,
-            profiles: Profiles::new(vec![dir.path().join("bin")]),
+            profiles: Profiles::new(bin),
         };
         let listener = open(&path).await.unwrap();
         let api = Api::start(path, listener, state.clone());
@@ -55,6 +58,14 @@ impl Bench {
 
     async fn get(&self, path: &str) -> (u16, String) {
         answer(self.ask("GET", path, "")).await
+    }
+
+    /// Puts a shell script among the executables.
+    fn install(&self, name: &str, text: &str) {
+        let bin = self.dir.path().join("bin");
+        fs::create_dir_all(&bin).unwrap();
+        fs::write(bin.join(name), format!("#!/bin/sh\n{text}\n")).unwrap();
+        fs::set_permissions(bin.join(name), fs::Permissions::from_mode(0o755)).unwrap();
     }
 
     /// Answers the next question for the status with robot-2 as the home of `mapping/lidar`.
@@ -179,6 +190,27 @@ async fn a_system_that_contradicts_itself_never_reaches_the_brain() {
 }
 
 #[tokio::test]
+async fn what_was_installed_a_moment_ago_is_told_before_the_deployment() {
+    let mut bench = Bench::new().await;
+    bench.install("camera", "exit 0");
+    let file = bench.dir.path().join("eye.yaml");
+    let text = "system: eye\ncomponents:\n  camera:\n    run: { native: camera }\n    needs: { memory: 10MB, cpu: 5% }\n";
+    fs::write(&file, text).unwrap();
+    let system = sdr_files::load_system(&file).unwrap().spec;
+
+    let client = bench.ask("POST", "/v1/deploy", &json!({ "system": system }).to_string());
+
+    let Input::Facts(facts) = bench.inputs.recv().await.unwrap() else { panic!("no facts") };
+    assert_eq!(facts.launchables, [sdr_core::spec::launch_hash("camera")]);
+    let Input::Deploy { request, .. } = bench.inputs.recv().await.unwrap() else {
+        panic!("no deployment")
+    };
+    let said = DeployAnswer { system: "eye".into(), revision: 1, changed: true };
+    bench.state.desk.answer(request, Ok(said));
+    assert_eq!(answer(client).await.0, 200);
+}
+
+#[tokio::test]
 async fn a_wish_is_answered_by_the_brain() {
     let mut bench = Bench::new().await;
     for (said, code, wanted) in [
@@ -291,17 +323,11 @@ async fn a_log_is_served_at_its_home_and_pointed_to_elsewhere() {
 #[tokio::test]
 async fn executables_describe_themselves_once() {
     let bench = Bench::new().await;
-    let bin = bench.dir.path().join("bin");
-    fs::create_dir(&bin).unwrap();
-    let script = |name: &str, text: &str| {
-        fs::write(bin.join(name), format!("#!/bin/sh\n{text}\n")).unwrap();
-        fs::set_permissions(bin.join(name), fs::Permissions::from_mode(0o755)).unwrap();
-    };
     let count = bench.dir.path().join("count");
     let profile = r#"{"name":"lidar","inputs":[],"outputs":[]}"#;
-    script("lidar", &format!("echo ran >> {}; echo '{profile}'", count.display()));
-    script("other", "exit 4");
-    script("library.so", "exit 0");
+    bench.install("lidar", &format!("echo ran >> {}; echo '{profile}'", count.display()));
+    bench.install("other", "exit 4");
+    bench.install("library.so", "exit 0");
 
     for _ in 0..2 {
         let (_, body) = bench.get("/v1/components").await;
