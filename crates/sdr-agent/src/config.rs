@@ -1,6 +1,6 @@
 //! From robot.toml to what each driver needs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::env;
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use sdr_files::RobotConfig;
 use sdr_files::robot::{BatterySource, PositionSource, RssiSource};
 
 use crate::installed;
-use crate::metrics::{MetricsConfig, Radio, Sensors, host};
+use crate::metrics::{MetricsConfig, Radio, Sensors, Source, host};
 use crate::supervisor::{LogFiles, Patience, SupervisorConfig};
 
 /// Where Linux shows wireless interfaces.
@@ -72,14 +72,16 @@ pub(crate) fn metrics(config: &RobotConfig) -> MetricsConfig {
         RssiSource::Auto => WIRELESS.into(),
         RssiSource::File(path) => path.clone(),
     };
-    let battery = config.sensors.battery.as_ref().and_then(|source| match source {
-        BatterySource::PowerSupply(name) => Some([POWER_SUPPLY, name, "capacity"].iter().collect()),
-        BatterySource::File(path) => Some(path.clone()),
-        BatterySource::Port(port) => unread("battery", &port.to_string()),
+    let battery = config.sensors.battery.as_ref().map(|source| match source {
+        BatterySource::PowerSupply(name) => {
+            Source::File([POWER_SUPPLY, name, "capacity"].iter().collect())
+        }
+        BatterySource::File(path) => Source::File(path.clone()),
+        BatterySource::Port(port) => Source::of_port(port.to_string()),
     });
-    let position = config.sensors.position.as_ref().and_then(|source| match source {
-        PositionSource::File(path) => Some(path.clone()),
-        PositionSource::Port(port) => unread("position", &port.to_string()),
+    let position = config.sensors.position.as_ref().map(|source| match source {
+        PositionSource::File(path) => Source::File(path.clone()),
+        PositionSource::Port(port) => Source::of_port(port.to_string()),
     });
     MetricsConfig {
         period: config.radio.period,
@@ -87,6 +89,12 @@ pub(crate) fn metrics(config: &RobotConfig) -> MetricsConfig {
         radio: Some(Radio { file, interface: config.radio.interface.clone() }),
         sensors: Sensors { battery, position },
     }
+}
+
+/// Ports whose samples are recorded.
+pub(crate) fn recorded_ports(config: &RobotConfig) -> BTreeSet<String> {
+    let ports = config.storage.recordings.iter().flat_map(|wanted| &wanted.ports);
+    ports.map(ToString::to_string).collect()
 }
 
 /// The supervisor's.
@@ -113,14 +121,4 @@ pub(crate) fn supervisor(config: &RobotConfig) -> SupervisorConfig {
         memory: shared_memory(config),
         patience: Patience::default(),
     }
-}
-
-fn unread(sensor: &str, port: &str) -> Option<PathBuf> {
-    tracing::warn!(
-        event = "sensor-unread",
-        sensor,
-        port,
-        "figures from ports are not read by this version; {sensor} is unknown"
-    );
-    None
 }

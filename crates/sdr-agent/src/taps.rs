@@ -1,6 +1,6 @@
-//! Chosen ports of this robot into the recording.
+//! Chosen ports of this robot: into the recording, and to the figures of its body.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use sdr_component::message::definition_of;
@@ -8,6 +8,7 @@ use sdr_core::{effect::LaunchOrder, spec::ComponentProfile};
 
 use crate::clock;
 use crate::data::{TapSample, TapSink};
+use crate::metrics::SensorPorts;
 use crate::record::RecordSender;
 
 /// The ROS 2 type of each port that was met so far, by `system.component.port`.
@@ -33,13 +34,34 @@ impl PortTypes {
     }
 }
 
+/// Who wants samples of which ports.
+#[derive(Debug)]
+pub(crate) struct Listeners {
+    /// Ports to record.
+    pub(crate) recorded: BTreeSet<String>,
+    /// Ports with figures of the body.
+    pub(crate) sensors: SensorPorts,
+}
+
+impl Listeners {
+    /// All ports that anybody wants.
+    pub(crate) fn ports(&self) -> Vec<String> {
+        let all: BTreeSet<_> = self.recorded.iter().cloned().chain(self.sensors.ports()).collect();
+        all.into_iter().collect()
+    }
+}
+
 /// Where the data plane puts samples of tapped ports.
-pub(crate) fn sink(types: PortTypes, record: RecordSender) -> TapSink {
+pub(crate) fn sink(types: PortTypes, record: RecordSender, mut listeners: Listeners) -> TapSink {
     Box::new(move |sample: TapSample<'_>| {
         let Some(message_type) = types.of(sample.port) else {
             tracing::debug!(event = "tap-untyped", port = sample.port);
             return;
         };
+        listeners.sensors.take(sample.port, &message_type, sample.body);
+        if !listeners.recorded.contains(sample.port) {
+            return;
+        }
         let mut cdr = Vec::with_capacity(sample.body.len() + 4);
         cdr.extend_from_slice(&[0, 1, 0, 0]);
         cdr.extend_from_slice(sample.body);

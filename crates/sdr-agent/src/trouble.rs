@@ -23,6 +23,10 @@ pub(crate) enum Kind {
     ComponentLine,
     /// A greeting on the components' socket by somebody who was not started by this agent.
     ComponentHello,
+    /// A sensor's port of another type than the sensor's.
+    SensorType,
+    /// A sample of a sensor's port that is no message of its type.
+    SensorSample,
     /// A request body or address that the API does not know.
     ApiRequest,
 }
@@ -35,6 +39,8 @@ impl Kind {
             Self::DatagramUnread => "datagrams_unread",
             Self::ComponentLine => "component_lines_bad",
             Self::ComponentHello => "component_hellos_refused",
+            Self::SensorType => "sensor_ports_mistyped",
+            Self::SensorSample => "sensor_samples_bad",
             Self::ApiRequest => "api_requests_bad",
         }
     }
@@ -72,6 +78,21 @@ impl Trouble {
             }
             count.seen
         };
+        self.publish(kind, what, seen);
+    }
+
+    /// Counts one and says it: for what its finder says only once.
+    pub(crate) fn say(&self, kind: Kind, what: &str) {
+        let seen = {
+            let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+            let count = counts.entry(kind).or_default();
+            count.seen += 1;
+            count.seen
+        };
+        self.publish(kind, what, seen);
+    }
+
+    fn publish(&self, kind: Kind, what: &str, seen: u64) {
         #[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^53")]
         let event = self.events.new_event("bad-input", what).number(kind.word(), seen as f64);
         self.events.publish(event);

@@ -23,11 +23,11 @@ use crate::effects::Effects;
 use crate::events::Events;
 use crate::installed::Installed;
 use crate::mesh::udp::Mesh;
-use crate::metrics::{Metrics, Watch};
+use crate::metrics::{Metrics, SensorPorts, Watch};
 use crate::record::{self, RecordSender, Recorder, RecorderNews};
 use crate::store::{self, Remembered, Store};
 use crate::supervisor::{self, Outlets, Supervisor};
-use crate::taps::{self, PortTypes};
+use crate::taps::{self, Listeners, PortTypes};
 use crate::trouble::Trouble;
 use crate::{clock, config, memory};
 
@@ -133,11 +133,15 @@ impl World {
             Supervisor::start(supervisor_config, outlets).map_err(because("components' socket"))?;
         let store = Store::start(state.clone(), sender.clone(), ground.events.clone())
             .map_err(because("store"))?;
-        let metrics =
-            Metrics::start(config::metrics(robot), watch, sender.clone(), ground.record.clone())
-                .map_err(because("metrics"))?;
-        let data =
-            start_data(robot, sender.clone(), taps::sink(types.clone(), ground.record.clone()))?;
+        let metrics_config = config::metrics(robot);
+        let sensors = SensorPorts::new(metrics_config.sensors.clone(), trouble.clone());
+        let metrics = Metrics::start(metrics_config, watch, sender.clone(), ground.record.clone())
+            .map_err(because("metrics"))?;
+        let listeners = Listeners { recorded: config::recorded_ports(robot), sensors };
+        let ports = listeners.ports();
+        let sink = taps::sink(types, ground.record.clone(), listeners);
+        let data = start_data(robot, sender.clone(), sink)?;
+        data.tap(ports);
 
         let (desk, plan) = (AnswerDesk::default(), LatestPlan::default());
         let api_state = ApiState {
@@ -253,10 +257,7 @@ fn start_data(
         domain_id: robot.ros.domain_id,
         memory: config::shared_memory(robot),
     };
-    let data = Data::start(data_config, inputs, sink)?;
-    let ports = robot.storage.recordings.iter().flat_map(|wanted| &wanted.ports);
-    data.tap(ports.map(ToString::to_string).collect());
-    Ok(data)
+    Ok(Data::start(data_config, inputs, sink)?)
 }
 
 /// Only one agent may use a state: its numbers must never be given twice.

@@ -3,7 +3,7 @@
 //! ```text
 //!  producer ─▶ shared memory ─▶ out_route: is it the active instance's? ─▶ transport (dds) ─┐
 //!                    │                                                                      │
-//!                    └▶ tap ─▶ recording                                                    ▼
+//!                    └▶ tap ─▶ recording, sensors                                           ▼
 //!  consumer ◀─ shared memory ◀─ in_route: stamp what is put in ◀─ transport (dds) ◀──── network
 //! ```
 //!
@@ -113,7 +113,7 @@ impl Data {
         self.bell.ring();
     }
 
-    /// These local ports (`system.component.port`), and no others, go to the recording.
+    /// These local ports (`system.component.port`), and no others, go to the sink.
     pub(crate) fn tap(&self, ports: Vec<String>) {
         self.desk.put(|wanted| wanted.taps = Some(ports));
         self.bell.ring();

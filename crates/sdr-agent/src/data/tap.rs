@@ -1,4 +1,4 @@
-//! Chosen ports of this robot, for the recording.
+//! Chosen ports of this robot, for the recording and the figures of its body.
 
 use std::os::fd::{AsFd, BorrowedFd};
 

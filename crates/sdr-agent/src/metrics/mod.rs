@@ -4,6 +4,7 @@
 //! when a component changes its state, so that memory is fresh exactly when it matters.
 
 pub(crate) mod host;
+mod ports;
 pub(crate) mod process;
 mod radio;
 mod sampler;
@@ -19,9 +20,10 @@ use tokio::sync::mpsc;
 
 use crate::clock;
 use crate::record::{RecordSender, stamp};
+pub(crate) use ports::SensorPorts;
 pub(crate) use radio::Radio;
 use sampler::{Sample, Sampler};
-pub(crate) use sensors::Sensors;
+pub(crate) use sensors::{Sensors, Source};
 pub(crate) use watch::Watch;
 
 /// Time between two reports of unchanged instances.
@@ -107,15 +109,16 @@ impl Desk {
     }
 
     fn report_host(&self, sample: &Sample) -> HostReport {
+        let now = clock::now();
         let host = HostReport {
             memory_used: sample.memory,
             cpu_used: sample.cpu,
-            battery: self.config.sensors.battery(),
+            battery: self.config.sensors.battery(now),
             rssi: self.config.radio.as_ref().and_then(Radio::level),
-            position: self.config.sensors.position(),
+            position: self.config.sensors.position(now),
         };
-        let now = clock::now().as_nanos();
-        self.record.record(now, &self.message(now, &host, sample));
+        let now_ns = now.as_nanos();
+        self.record.record(now_ns, &self.message(now_ns, &host, sample));
         host
     }
 

@@ -96,7 +96,7 @@ static KNOWN: &[(&str, &str)] = entries! {
     geometry_msgs: Vector3 Point Quaternion Pose PoseStamped PoseWithCovariance Twist
         TwistWithCovariance;
     nav_msgs: Odometry;
-    sensor_msgs: Image CompressedImage Imu;
+    sensor_msgs: Image CompressedImage Imu BatteryState;
 };
 
 /// Makes a struct that has `serde` a [`Message`] that is sent and received whole.

@@ -40,6 +40,51 @@ plain_message!(
     msg!("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"),
 );
 
+/// A battery's charge and health. Floats that were not measured are NaN.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BatteryState {
+    /// Whose battery it is, and when.
+    pub header: Header,
+    /// Volts.
+    pub voltage: f32,
+    /// Degrees Celsius.
+    pub temperature: f32,
+    /// Amperes; below zero while it discharges.
+    pub current: f32,
+    /// Ampere hours in it now.
+    pub charge: f32,
+    /// Ampere hours when it was full last.
+    pub capacity: f32,
+    /// Ampere hours as it was built.
+    pub design_capacity: f32,
+    /// Charge, 0 to 1.
+    pub percentage: f32,
+    /// 0 unknown, 1 charging, 2 discharging, 3 not charging, 4 full.
+    pub power_supply_status: u8,
+    /// 0 unknown, 1 good, more: what is wrong.
+    pub power_supply_health: u8,
+    /// 0 unknown, 1 NiMH, 2 Li-ion, 3 LiPo, 4 LiFe, 5 NiCd, 6 LiMn.
+    pub power_supply_technology: u8,
+    /// Whether there is one.
+    pub present: bool,
+    /// Volts of each cell.
+    pub cell_voltage: Vec<f32>,
+    /// Degrees Celsius of each cell.
+    pub cell_temperature: Vec<f32>,
+    /// Where it sits.
+    pub location: String,
+    /// As printed on it.
+    pub serial_number: String,
+}
+
+plain_message!(
+    BatteryState,
+    "sensor_msgs/msg/BatteryState",
+    "std_msgs/Header header\nfloat32 voltage\nfloat32 temperature\nfloat32 current\nfloat32 charge\nfloat32 capacity\nfloat32 design_capacity\nfloat32 percentage\nuint8 power_supply_status\nuint8 power_supply_health\nuint8 power_supply_technology\nbool present\nfloat32[] cell_voltage\nfloat32[] cell_temperature\nstring location\nstring serial_number\n",
+    msg!("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"),
+    msg!("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
+);
+
 /// A picture, as a type; what is sent and received is an [`ImageView`].
 #[derive(Debug)]
 pub enum Image {}

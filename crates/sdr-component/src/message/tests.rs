@@ -68,6 +68,24 @@ fn odometry_keeps_its_covariances() {
 }
 
 #[test]
+fn a_charge_stands_where_ros_2_has_it() {
+    let battery = BatteryState {
+        percentage: 0.5,
+        present: true,
+        cell_voltage: vec![3.7, 3.8],
+        serial_number: String::from("b7"),
+        ..BatteryState::default()
+    };
+
+    // Stamp, the empty name of a frame with its padding, and six floats come before it.
+    let bytes = encoded(&battery);
+    assert_eq!(bytes[8..13], [1, 0, 0, 0, 0]);
+    assert_eq!(bytes[40..44], 0.5_f32.to_le_bytes());
+    assert_eq!(bytes[44..48], [0, 0, 0, 1]);
+    survives(&battery);
+}
+
+#[test]
 fn a_picture_is_filled_in_place() {
     let shape = ImageView::rgb8(Time::from_nanos(5), "camera", 2, 1, &[]);
     let mut bytes = vec![0; shape.encoded_len_with(6)];
@@ -140,6 +158,7 @@ proptest! {
         let _ = Image::decode(&bytes);
         let _ = CompressedImage::decode(&bytes);
         let _ = Imu::decode(&bytes);
+        let _ = BatteryState::decode(&bytes);
         let _ = nav_msgs::Odometry::decode(&bytes);
         let _ = std_msgs::String::decode(&bytes);
         let _ = std_msgs::Bool::decode(&bytes);
