@@ -12,13 +12,19 @@ use crate::events::Events;
 /// Time between two events about the same kind of bad input.
 const SAY_PERIOD: Duration = Duration::from_secs(10);
 
-/// Kinds of bad input that the shell itself sees.
+/// Kinds of bad input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
     /// A datagram larger than any agent sends.
     DatagramOversized,
     /// A datagram that came while the loop was too busy to take it.
     DatagramUnread,
+    /// A datagram that is none of the mesh's, as the brain found.
+    DatagramMalformed,
+    /// A datagram of another fleet, as the brain found.
+    DatagramForeign,
+    /// A datagram that brought nothing new, in a second in which most did.
+    DatagramStale,
     /// A line on the components' socket that is none of the protocol.
     ComponentLine,
     /// A greeting on the components' socket by somebody who was not started by this agent.
@@ -37,6 +43,9 @@ impl Kind {
         match self {
             Self::DatagramOversized => "datagrams_oversized",
             Self::DatagramUnread => "datagrams_unread",
+            Self::DatagramMalformed => "datagrams_malformed",
+            Self::DatagramForeign => "datagrams_foreign",
+            Self::DatagramStale => "datagrams_stale",
             Self::ComponentLine => "component_lines_bad",
             Self::ComponentHello => "component_hellos_refused",
             Self::SensorType => "sensor_ports_mistyped",
@@ -56,7 +65,20 @@ pub(crate) struct Trouble {
 #[derive(Clone, Copy, Debug, Default)]
 struct Count {
     seen: u64,
+    /// Of those that somebody else counts: how many when it was said last.
+    said: u64,
     said_at: Option<Instant>,
+}
+
+impl Count {
+    /// Whether it may be said again; if so, it is said now.
+    fn is_due(&mut self, now: Instant) -> bool {
+        let due = self.said_at.is_none_or(|at| now.since(at) >= SAY_PERIOD);
+        if due {
+            self.said_at = Some(now);
+        }
+        due
+    }
 }
 
 impl Trouble {
@@ -72,12 +94,30 @@ impl Trouble {
             let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
             let count = counts.entry(kind).or_default();
             count.seen += 1;
-            match count.said_at {
-                Some(at) if now.since(at) < SAY_PERIOD => return,
-                Some(_) | None => count.said_at = Some(now),
+            if !count.is_due(now) {
+                return;
             }
             count.seen
         };
+        self.publish(kind, what, seen);
+    }
+
+    /// As [`Trouble::count`] for what somebody else counts, and has counted `seen` of so far:
+    /// growth is an event, now or when the while is over.
+    pub(crate) fn note(&self, kind: Kind, seen: u64, what: &str) {
+        let now = clock::now();
+        {
+            let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+            if seen == 0 && !counts.contains_key(&kind) {
+                return;
+            }
+            let count = counts.entry(kind).or_default();
+            count.seen = seen;
+            if seen <= count.said || !count.is_due(now) {
+                return;
+            }
+            count.said = seen;
+        }
         self.publish(kind, what, seen);
     }
 
@@ -122,5 +162,15 @@ mod tests {
 
         assert_eq!(trouble.counters()["component_lines_bad"], 1000);
         assert_eq!(events.since(0).len(), 2);
+    }
+
+    #[test]
+    fn growth_that_was_kept_back_is_said_later() {
+        let mut count = Count::default();
+        let start = Instant::from_millis(1_000_000);
+
+        assert!(count.is_due(start));
+        assert!(!count.is_due(start + SAY_PERIOD / 2));
+        assert!(count.is_due(start + SAY_PERIOD));
     }
 }

@@ -17,12 +17,12 @@ use sdr_files::robot::OnAgentDeath;
 use thiserror::Error;
 use tokio::sync::mpsc;
 
-use crate::api::{self, AnswerDesk, Api, ApiError, ApiState, LatestPlan, Profiles, StatusQuestion};
-use crate::data::{Data, DataConfig, DataError, TapSink};
+use crate::api::{self, AnswerDesk, Api, ApiError, ApiState, LatestPlan, Profiles, Question};
+use crate::data::{Data, DataConfig, DataError};
 use crate::effects::Effects;
 use crate::events::Events;
 use crate::installed::Installed;
-use crate::mesh::udp::Mesh;
+use crate::mesh::{udp::Mesh, watch::MeshWatch};
 use crate::metrics::{Metrics, SensorPorts, Watch};
 use crate::record::{self, RecordSender, Recorder, RecorderNews};
 use crate::store::{self, Remembered, Store};
@@ -33,7 +33,7 @@ use crate::{clock, config, memory};
 
 /// Inputs that may wait for the loop.
 const INPUTS_MAX: usize = 4096;
-/// Status questions that may wait for the loop.
+/// Questions that may wait for the loop.
 const QUESTIONS_MAX: usize = 16;
 
 /// Why the agent does not start. Nothing was changed on the robot; the operator can mend it.
@@ -72,9 +72,11 @@ pub(crate) struct World {
     /// Metrics, mesh, and what came of effects.
     pub(crate) inputs: mpsc::Receiver<Input>,
     /// From the API.
-    pub(crate) questions: mpsc::Receiver<StatusQuestion>,
+    pub(crate) questions: mpsc::Receiver<Question>,
     /// Who takes orders.
     pub(crate) effects: Effects,
+    /// Looks at what the mesh counts.
+    pub(crate) mesh_watch: MeshWatch,
     api: Api,
     metrics: Metrics,
     recorder: Option<Recorder>,
@@ -107,7 +109,6 @@ impl World {
         let (sender, inputs) = mpsc::channel(INPUTS_MAX);
         let (asker, questions) = mpsc::channel(QUESTIONS_MAX);
         let trouble = Trouble::new(ground.events.clone());
-        let (watch, types) = (Watch::default(), PortTypes::default());
 
         let address = robot.mesh.listen;
         let mesh = Mesh::start(address, sender.clone(), trouble.clone())
@@ -122,26 +123,18 @@ impl World {
 
         let outlets = Outlets {
             inputs: sender.clone(),
-            watch: watch.clone(),
-            record: ground.record.clone(),
+            watch: Watch::default(),
+            record: ground.record,
             trouble: trouble.clone(),
-            types: types.clone(),
+            types: PortTypes::default(),
         };
         let supervisor_config = config::supervisor(robot);
         let logs = supervisor_config.logs.clone();
-        let supervisor =
-            Supervisor::start(supervisor_config, outlets).map_err(because("components' socket"))?;
+        let supervisor = Supervisor::start(supervisor_config, outlets.clone())
+            .map_err(because("components' socket"))?;
         let store = Store::start(state.clone(), sender.clone(), ground.events.clone())
             .map_err(because("store"))?;
-        let metrics_config = config::metrics(robot);
-        let sensors = SensorPorts::new(metrics_config.sensors.clone(), trouble.clone());
-        let metrics = Metrics::start(metrics_config, watch, sender.clone(), ground.record.clone())
-            .map_err(because("metrics"))?;
-        let listeners = Listeners { recorded: config::recorded_ports(robot), sensors };
-        let ports = listeners.ports();
-        let sink = taps::sink(types, ground.record.clone(), listeners);
-        let data = start_data(robot, sender.clone(), sink)?;
-        data.tap(ports);
+        let (metrics, data) = start_senses(robot, outlets)?;
 
         let (desk, plan) = (AnswerDesk::default(), LatestPlan::default());
         let api_state = ApiState {
@@ -150,8 +143,9 @@ impl World {
             questions: asker,
             desk: desk.clone(),
             events: ground.events.clone(),
-            trouble,
+            trouble: trouble.clone(),
             plan: plan.clone(),
+            routes: data.ledger(),
             logs,
             installed: installed.clone(),
             recording: ground.recorder.as_ref().map(Recorder::flusher),
@@ -165,6 +159,7 @@ impl World {
             inputs,
             questions,
             effects,
+            mesh_watch: MeshWatch::new(trouble),
             api,
             metrics,
             recorder: ground.recorder,
@@ -247,17 +242,23 @@ fn start_recorder(robot: &RobotConfig, events: &Events) -> Result<Option<Recorde
     Ok(Some(recorder))
 }
 
-fn start_data(
-    robot: &RobotConfig,
-    inputs: mpsc::Sender<Input>,
-    sink: TapSink,
-) -> Result<Data, StartError> {
+/// Starts what looks at the robot and what carries its samples: ports feel for the metrics.
+fn start_senses(robot: &RobotConfig, outlets: Outlets) -> Result<(Metrics, Data), StartError> {
+    let Outlets { inputs, watch, record, trouble, types } = outlets;
+    let metrics_config = config::metrics(robot);
+    let sensors = SensorPorts::new(metrics_config.sensors.clone(), trouble);
+    let metrics = Metrics::start(metrics_config, watch, inputs.clone(), record.clone())
+        .map_err(because("metrics"))?;
+    let listeners = Listeners { recorded: config::recorded_ports(robot), sensors };
+    let ports = listeners.ports();
     let data_config = DataConfig {
         robot: robot.name.clone(),
         domain_id: robot.ros.domain_id,
         memory: config::shared_memory(robot),
     };
-    Ok(Data::start(data_config, inputs, sink)?)
+    let data = Data::start(data_config, inputs, taps::sink(types, record, listeners))?;
+    data.tap(ports);
+    Ok((metrics, data))
 }
 
 /// Only one agent may use a state: its numbers must never be given twice.

@@ -20,12 +20,14 @@ use sdr_core::{
     api::{DeployAnswer, PlanView, StatusView},
     id::RobotId,
     input::{Input, RequestId},
+    mesh::MeshCounters,
 };
 use thiserror::Error;
 use tokio::net::{UnixListener, UnixStream};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 
+use crate::data::Ledger;
 use crate::events::Events;
 use crate::installed::Installed;
 use crate::record::Flusher;
@@ -38,18 +40,25 @@ const BODY_BYTES_MAX: usize = 1 << 20;
 
 /// A question that only the loop can answer, since it holds the brain.
 #[derive(Debug)]
-pub(crate) struct StatusQuestion(pub(crate) oneshot::Sender<StatusView>);
+pub(crate) enum Question {
+    /// What it believes of the fleet.
+    Status(oneshot::Sender<StatusView>),
+    /// What its mesh counted.
+    Mesh(oneshot::Sender<MeshCounters>),
+}
 
 /// What the API needs of the rest of the agent.
 #[derive(Clone, Debug)]
 pub(crate) struct ApiState {
     pub(crate) robot: RobotId,
     pub(crate) inputs: mpsc::Sender<Input>,
-    pub(crate) questions: mpsc::Sender<StatusQuestion>,
+    pub(crate) questions: mpsc::Sender<Question>,
     pub(crate) desk: AnswerDesk,
     pub(crate) events: Events,
     pub(crate) trouble: Trouble,
     pub(crate) plan: LatestPlan,
+    /// What the bridge counts.
+    pub(crate) routes: Arc<Ledger>,
     pub(crate) logs: LogFiles,
     pub(crate) installed: Installed,
     /// `None` when nothing is recorded.

@@ -16,7 +16,7 @@ struct Bench {
     api: Api,
     state: ApiState,
     inputs: mpsc::Receiver<Input>,
-    questions: mpsc::Receiver<StatusQuestion>,
+    questions: mpsc::Receiver<Question>,
 }
 
 impl Bench {
@@ -37,6 +37,7 @@ impl Bench {
             trouble: Trouble::new(events.clone()),
             events,
             plan: LatestPlan::default(),
+            routes: Arc::default(),
             logs: LogFiles { dir: dir.path().into(), each_bytes_max: 1 << 20, bytes_max: 1 << 20 },
             recording: None,
             profiles: Profiles::new(bin),
@@ -70,8 +71,10 @@ impl Bench {
 
     /// Answers the next question for the status with robot-2 as the home of `mapping/lidar`.
     async fn tell_status(&mut self) {
-        let StatusQuestion(asker) = self.questions.recv().await.unwrap();
-        asker.send(status()).unwrap();
+        match self.questions.recv().await.unwrap() {
+            Question::Status(asker) => asker.send(status()).unwrap(),
+            Question::Mesh(_) => panic!("another question"),
+        }
     }
 }
 
@@ -130,6 +133,29 @@ async fn the_status_is_what_the_loop_says() {
     let (code, body) = answer(client).await;
     assert_eq!(code, 200);
     assert_eq!(serde_json::from_str::<StatusView>(&body).unwrap(), status());
+}
+
+#[tokio::test]
+async fn health_has_the_counters_of_the_mesh_and_of_each_route() {
+    let mut bench = Bench::new().await;
+    bench.state.routes.open("tunnel/fisheye/image", crate::data::Way::Out).forwarded.add(7);
+    let client = bench.ask("GET", "/v1/health", "");
+
+    match bench.questions.recv().await.unwrap() {
+        Question::Mesh(asker) => {
+            let counted = MeshCounters { received: 9, malformed: 1, ..MeshCounters::default() };
+            asker.send(counted).unwrap();
+        }
+        Question::Status(_) => panic!("another question"),
+    }
+
+    let (code, body) = answer(client).await;
+    let view: Value = serde_json::from_str(&body).unwrap();
+    assert_eq!((code, &view["mesh"]["received"]), (200, &json!(9)), "{body}");
+    assert_eq!((&view["mesh"]["malformed"], &view["mesh"]["sent"]), (&json!(1), &json!(0)));
+    let route = &view["routes"][0];
+    assert_eq!((&route["path"], &route["way"]), (&json!("tunnel/fisheye/image"), &json!("out")));
+    assert_eq!((&route["forwarded"], &route["dropped_rate"]), (&json!(7), &json!(0)));
 }
 
 #[tokio::test]

@@ -7,12 +7,16 @@ use std::sync::PoisonError;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
-use sdr_core::api::{PlanView, StatusView};
+use sdr_core::{
+    api::{PlanView, StatusView},
+    mesh::MeshCounters,
+};
 use serde::Serialize;
 use tokio::sync::oneshot;
 
 use super::answer::Refusal;
-use super::{ApiState, StatusQuestion};
+use super::{ApiState, Question};
+use crate::data::Way;
 
 /// `GET /v1/health`.
 #[derive(Debug, Serialize)]
@@ -25,6 +29,31 @@ pub(super) struct HealthView {
     pid: u32,
     /// Bad input so far, by kind.
     bad_input: BTreeMap<String, u64>,
+    /// What the mesh counted.
+    mesh: MeshView,
+    /// What crossed this robot's border.
+    routes: Vec<RouteView>,
+}
+
+/// Counters of the mesh since the agent's start.
+#[derive(Debug, Serialize)]
+struct MeshView {
+    received: u64,
+    malformed: u64,
+    foreign: u64,
+    stale: u64,
+    refused: u64,
+    sent: u64,
+    sent_bytes: u64,
+}
+
+/// Counters of one route since it was made.
+#[derive(Debug, Serialize)]
+struct RouteView {
+    path: String,
+    way: &'static str,
+    #[serde(flatten)]
+    counters: BTreeMap<&'static str, u64>,
 }
 
 /// `GET /v1/recording`.
@@ -41,18 +70,35 @@ pub(super) async fn status(State(state): State<ApiState>) -> Result<Json<StatusV
 /// Asks the loop.
 pub(super) async fn ask_status(state: &ApiState) -> Result<StatusView, Refusal> {
     let (sender, receiver) = oneshot::channel();
-    let question = StatusQuestion(sender);
-    state.questions.send(question).await.map_err(|_| Refusal::stopping())?;
+    state.questions.send(Question::Status(sender)).await.map_err(|_| Refusal::stopping())?;
     receiver.await.map_err(|_| Refusal::stopping())
 }
 
-pub(super) async fn health(State(state): State<ApiState>) -> Json<HealthView> {
-    Json(HealthView {
+pub(super) async fn health(State(state): State<ApiState>) -> Result<Json<HealthView>, Refusal> {
+    let (sender, receiver) = oneshot::channel();
+    state.questions.send(Question::Mesh(sender)).await.map_err(|_| Refusal::stopping())?;
+    let counted = receiver.await.map_err(|_| Refusal::stopping())?;
+    let routes = state.routes.read().into_iter().map(|(path, way, counters)| RouteView {
+        path,
+        way: match way {
+            Way::Out => "out",
+            Way::In => "in",
+        },
+        counters: counters.named().collect(),
+    });
+    Ok(Json(HealthView {
         robot: state.robot.to_string(),
         version: env!("CARGO_PKG_VERSION"),
         pid: std::process::id(),
         bad_input: state.trouble.counters(),
-    })
+        mesh: mesh_view(&counted),
+        routes: routes.collect(),
+    }))
+}
+
+fn mesh_view(counted: &MeshCounters) -> MeshView {
+    let MeshCounters { received, malformed, foreign, stale, refused, sent, sent_bytes } = *counted;
+    MeshView { received, malformed, foreign, stale, refused, sent, sent_bytes }
 }
 
 pub(super) async fn plan(State(state): State<ApiState>) -> Json<PlanView> {

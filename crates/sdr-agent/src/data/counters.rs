@@ -27,8 +27,8 @@ macro_rules! counters {
 
         /// The same, while they grow.
         #[derive(Debug, Default)]
-        pub(super) struct Counts {
-            $(pub(super) $name: Count,)*
+        pub(crate) struct Counts {
+            $(pub(crate) $name: Count,)*
         }
 
         impl Counts {
@@ -72,35 +72,36 @@ counters! {
 
 /// One growing or set number.
 #[derive(Debug, Default)]
-pub(super) struct Count(AtomicU64);
+pub(crate) struct Count(AtomicU64);
 
 impl Count {
-    pub(super) fn add(&self, more: u64) {
+    pub(crate) fn add(&self, more: u64) {
         self.0.fetch_add(more, Relaxed);
     }
 
-    pub(super) fn set(&self, value: u64) {
+    pub(crate) fn set(&self, value: u64) {
         self.0.store(value, Relaxed);
     }
 }
 
 /// Which counts belong to which route; shared by the bridge and those who ask.
 #[derive(Debug, Default)]
-pub(super) struct Ledger(Mutex<BTreeMap<(String, Way), Arc<Counts>>>);
+pub(crate) struct Ledger(Mutex<BTreeMap<(String, Way), Arc<Counts>>>);
 
 impl Ledger {
     /// Fresh counts for a route.
-    pub(super) fn open(&self, path: &str, way: Way) -> Arc<Counts> {
+    pub(crate) fn open(&self, path: &str, way: Way) -> Arc<Counts> {
         let counts = Arc::new(Counts::default());
         self.lock().insert((path.to_owned(), way), Arc::clone(&counts));
         counts
     }
 
-    pub(super) fn close(&self, path: &str, way: Way) {
+    pub(crate) fn close(&self, path: &str, way: Way) {
         self.lock().remove(&(path.to_owned(), way));
     }
 
-    pub(super) fn read(&self) -> Vec<(String, Way, RouteCounters)> {
+    /// What each route did so far.
+    pub(crate) fn read(&self) -> Vec<(String, Way, RouteCounters)> {
         let lock = self.lock();
         lock.iter().map(|((path, way), counts)| (path.clone(), *way, counts.read())).collect()
     }

@@ -35,11 +35,10 @@ use tokio::sync::mpsc::Sender;
 
 use bell::Bell;
 use bridge::{Bridge, Setting};
-use counters::Ledger;
 use dds::Dds;
 use desk::Desk;
 
-pub(crate) use counters::RouteCounters;
+pub(crate) use counters::{Ledger, RouteCounters};
 pub(crate) use tap::{TapSample, TapSink};
 pub(crate) use transport::Way;
 
@@ -117,6 +116,11 @@ impl Data {
     pub(crate) fn tap(&self, ports: Vec<String>) {
         self.desk.put(|wanted| wanted.taps = Some(ports));
         self.bell.ring();
+    }
+
+    /// The book of what each route does, for those who ask later.
+    pub(crate) fn ledger(&self) -> Arc<Ledger> {
+        Arc::clone(&self.ledger)
     }
 
     /// What each route did so far.

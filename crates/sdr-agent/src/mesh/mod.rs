@@ -1,3 +1,4 @@
 //! The robot's ear and mouth for other robots.
 
 pub(crate) mod udp;
+pub(crate) mod watch;
