@@ -8,6 +8,12 @@ source "$here/.ci/missing.sh"
 # stdout belongs to the demo: with -o json it holds JSON and nothing else.
 {
     need_rust
+    # The report names its build; only the CLI reads them, so nothing else is built anew.
+    SDR_RUSTC=$(rustc -V)
+    export SDR_RUSTC
+    if [ -e "$here/.git" ] && SDR_COMMIT=$(git -C "$here" describe --always --dirty --exclude='*'); then
+        export SDR_COMMIT
+    fi
     # The default members: the agent, the CLI, the components.
     cargo build --release --locked --manifest-path "$here/Cargo.toml"
 } >&2
