@@ -70,3 +70,50 @@ pub(crate) fn sink(types: PortTypes, record: RecordSender, mut listeners: Listen
         record.message(&topic, &message_type, definition, clock::now().as_nanos(), cdr);
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use sdr_component::message::{Encode as _, Message as _, sensor_msgs::BatteryState};
+    use sdr_core::{id::RobotId, units::Permille};
+
+    use super::*;
+    use crate::events::Events;
+    use crate::metrics::{Sensors, Source};
+    use crate::record::Recorder;
+    use crate::trouble::Trouble;
+
+    #[test]
+    fn a_sensors_port_is_felt_and_only_wished_ports_are_recorded() {
+        let robot = RobotId::new("robot-1").unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        let recorder = Recorder::start(dir.path(), &robot, u64::MAX, |_| {}).unwrap();
+        let sensors =
+            Sensors { battery: Some(Source::of_port("s.body.battery")), ..Sensors::default() };
+        let trouble = Trouble::new(Events::new(robot));
+        let listeners = Listeners {
+            recorded: BTreeSet::from(["s.body.spare".to_owned()]),
+            sensors: SensorPorts::new(sensors.clone(), trouble),
+        };
+        assert_eq!(listeners.ports(), ["s.body.battery", "s.body.spare"]);
+        let types = PortTypes::default();
+        for port in listeners.ports() {
+            types.0.lock().unwrap().insert(port, BatteryState::TYPE.to_owned());
+        }
+        let mut sink = sink(types, recorder.sender(), listeners);
+
+        for (port, percentage) in [("s.body.battery", 0.25), ("s.body.spare", 0.75)] {
+            let said = BatteryState { percentage, ..BatteryState::default() };
+            let mut body = vec![0; said.encoded_len()];
+            said.encode(&mut body).unwrap();
+            sink(TapSample { port, body: &body });
+        }
+
+        assert_eq!(sensors.battery(clock::now()), Some(Permille(250)));
+        let bytes = std::fs::read(recorder.flusher().flush()).unwrap();
+        let topics: Vec<_> = mcap::MessageStream::new(&bytes)
+            .unwrap()
+            .map(|message| message.unwrap().channel.topic.clone())
+            .collect();
+        assert_eq!(topics, ["/s/body/spare"]);
+    }
+}

@@ -26,9 +26,12 @@ impl MeshWatch {
     /// Looks at the counters; to be called once a second.
     pub(crate) fn look(&mut self, now: MeshCounters) {
         let said =
-            format!("{} of {} datagrams were none of the mesh's", now.malformed, now.received);
+            format!("{} datagrams were none of the mesh's, {} were", now.malformed, now.received);
         self.trouble.note(Kind::DatagramMalformed, now.malformed, &said);
-        let said = format!("{} of {} datagrams were of another fleet", now.foreign, now.received);
+        let said = format!(
+            "{} datagrams were of another fleet, {} of this one",
+            now.foreign, now.received
+        );
         self.trouble.note(Kind::DatagramForeign, now.foreign, &said);
 
         let stale = now.stale.saturating_sub(self.before.stale);
@@ -68,8 +71,8 @@ mod tests {
         assert_eq!(
             reasons,
             [
-                "7 of 300 datagrams were none of the mesh's",
-                "2 of 300 datagrams were of another fleet",
+                "7 datagrams were none of the mesh's, 300 were",
+                "2 datagrams were of another fleet, 300 of this one",
                 "100 of the last 100 datagrams were repeated or played back",
             ]
         );

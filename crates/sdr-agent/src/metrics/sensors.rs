@@ -64,11 +64,11 @@ impl<T: Copy> Source<T> {
 }
 
 impl Sensors {
-    pub(super) fn battery(&self, now: Instant) -> Option<Permille> {
+    pub(crate) fn battery(&self, now: Instant) -> Option<Permille> {
         self.battery.as_ref()?.figure(now, parse_battery)
     }
 
-    pub(super) fn position(&self, now: Instant) -> Option<Position> {
+    pub(crate) fn position(&self, now: Instant) -> Option<Position> {
         self.position.as_ref()?.figure(now, parse_position)
     }
 }
