@@ -227,6 +227,13 @@ pub trait Recovery {
     /// Causes that hold now, raised or not yet.
     fn standing(&self) -> Vec<CauseStatus>;
 
+    /// Whether the policy says what to do about `cause` at all.
+    fn has_rule(&self, cause: Cause) -> bool;
+
+    /// Why nothing should be placed on a robot with these figures now: a bar of its own rules
+    /// that they are beyond already, with numbers. Facts that are unknown object to nothing.
+    fn objection(&self, robot: &RobotEvidence) -> Option<(Cause, String)>;
+
     /// How long a component must not come back to a robot that it left for a cause.
     fn not_back_for(&self) -> Duration;
 }

@@ -137,8 +137,10 @@ impl Brain {
     fn avoid(&self, now: Instant, system: &SystemNow, names: &[Name]) -> BTreeMap<Name, Avoid> {
         let mut avoid: BTreeMap<Name, Avoid> = BTreeMap::new();
         let calls = self.calls_for_help(&system.name);
+        let ill = self.ill_robots(system);
         for name in names {
             let list = avoid.entry(name.clone()).or_default();
+            list.extend(ill.iter().cloned());
             for (robot, condition) in &calls {
                 let robot_wide = !super::judge::is_event(condition.cause);
                 if robot_wide || condition.components.contains(name) {
@@ -152,6 +154,17 @@ impl Brain {
             }
         }
         avoid
+    }
+
+    /// Robots on which the system's own recovery would act at once.
+    fn ill_robots(&self, system: &SystemNow) -> Avoid {
+        let Some(engine) = self.make_engine(&system.recovery) else { return Avoid::new() };
+        let robots = self.alive_robots().into_iter();
+        let ill = robots.filter_map(|robot| {
+            let (_, reason) = engine.recovery.objection(&self.figures_of(&robot)?)?;
+            Some((robot, reason))
+        });
+        ill.collect()
     }
 
     pub(super) fn handle_planned(

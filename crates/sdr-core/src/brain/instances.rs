@@ -118,6 +118,7 @@ impl Brain {
             }
             InstanceNews::LaunchFailed { reason } => self.lose(id, &key, Cause::Exited, reason),
             InstanceNews::Exited { reason } => self.lose(id, &key, Cause::Exited, reason),
+            InstanceNews::Hung { .. } if instance.is_ending() => self.kill_again(id),
             InstanceNews::Hung { reason } => {
                 self.event_about("hung", &key, reason.clone());
                 self.raise(&key, Cause::Hung, reason);
@@ -125,7 +126,8 @@ impl Brain {
             }
             InstanceNews::State { state, token, fault } => {
                 self.handle_state(now, id, (state, token));
-                if let Some((cause, reason)) = fault {
+                let ending = self.instances.get(&id).is_none_or(Instance::is_ending);
+                if let Some((cause, reason)) = fault.filter(|_| !ending) {
                     self.event_about("error", &key, format!("{cause}: {reason}"));
                     self.raise(&key, cause, reason);
                 }
@@ -198,6 +200,7 @@ impl Brain {
             return;
         }
         self.faults.insert(key.clone(), Fault { cause, reason });
+        self.failed.insert(key.clone());
         self.judge_due = true;
     }
 
@@ -209,6 +212,11 @@ impl Brain {
     /// Ends an instance that does not listen.
     pub(super) fn kill(&mut self, id: InstanceId) {
         self.end(id, Command::Kill);
+    }
+
+    /// It was told to end and hangs on its way.
+    fn kill_again(&mut self, id: InstanceId) {
+        self.command(id, Command::Kill);
     }
 
     fn end(&mut self, id: InstanceId, how: Command) {

@@ -6,13 +6,13 @@ use core::fmt;
 use super::Brain;
 use crate::{
     event::Event,
-    id::{ComponentKey, Name},
+    id::{ComponentKey, Name, RobotId},
     lifecycle::LifecycleState,
     mesh::{AuthorKey, Push},
     recover::{
         Cause, CauseStatus, Evidence, Recovery, Remedy, RemedyOutcome, RobotEvidence, Verdict,
     },
-    report::{ConditionReport, Report},
+    report::{ConditionReport, LinkReport, Report},
     spec::PolicyBytes,
     time::{Duration, Instant},
     units::Permille,
@@ -59,12 +59,29 @@ impl Brain {
             if !self.ensure_engine(&name) {
                 continue;
             }
+            self.hold_what_has_no_rule(&name, &evidence);
             let engine = self.engines.get_mut(&name).expect("ensured above");
             for verdict in engine.recovery.judge(now, &evidence) {
                 self.carry_out(now, &name, verdict);
             }
         }
         self.clear_conditions(now);
+    }
+
+    /// A fault that the policy says nothing about is told, and nothing is tried.
+    fn hold_what_has_no_rule(&mut self, name: &Name, evidence: &[Evidence]) {
+        for seen in evidence {
+            let Some(fault) = &seen.fault else { continue };
+            let engine = &self.engines[name];
+            if !engine.recovery.has_rule(fault.cause) {
+                let text = format!(
+                    "no rule for {} in recovery `{}`: {}",
+                    fault.cause, engine.policy.name, fault.reason
+                );
+                self.held.insert(seen.component.clone(), text.clone());
+                self.event_about("held", &seen.component, text);
+            }
+        }
     }
 
     /// Makes the engine of a system when there is none for its present policy.
@@ -98,7 +115,6 @@ impl Brain {
     /// What is seen of the components whose home is here.
     fn evidence(&mut self, name: &Name) -> Vec<Evidence> {
         let Some(system) = self.systems.get(name) else { return Vec::new() };
-        let robot = self.robot_evidence();
         let mut evidence = Vec::new();
         for spec in &system.components {
             let component = system.key(&spec.name);
@@ -116,35 +132,60 @@ impl Brain {
                 memory: usage.memory,
                 cpu: usage.cpu,
                 cpu_limit: spec.needs.cpu,
-                robot,
+                robot: self.robot_evidence(&component),
                 component,
             });
         }
         evidence
     }
 
-    fn robot_evidence(&self) -> RobotEvidence {
-        let Some(host) = self.host else { return RobotEvidence::default() };
-        let mut delays: Vec<Duration> = Vec::new();
-        let mut jitters: Vec<Duration> = Vec::new();
-        let mut losses: Vec<Permille> = Vec::new();
-        for (robot, link) in self.mesh.links() {
-            if self.mesh.is_alive(robot) {
-                delays.push(link.rtt / 2);
-                jitters.push(link.jitter);
-                losses.push(link.loss);
-            }
-        }
-        let capacity = self.config.facts.cpu_capacity.0.max(1);
-        RobotEvidence {
-            memory_free: Some(self.config.facts.memory_capacity.less(host.memory_used)),
+    /// Figures of a robot as it reports them; links are its own matter.
+    pub(super) fn figures_of(&self, robot: &RobotId) -> Option<RobotEvidence> {
+        let facts = self.facts(robot)?;
+        let mine = (*robot == self.me).then_some(self.host).flatten();
+        let host = mine.or_else(|| self.host_of(robot).copied())?;
+        let capacity = facts.cpu_capacity.0.max(1);
+        Some(RobotEvidence {
+            memory_free: Some(facts.memory_capacity.less(host.memory_used)),
             cpu: Some(Permille(host.cpu_used.0.saturating_mul(1000) / capacity)),
             battery: host.battery,
             rssi: host.rssi,
-            delay: median(delays),
-            jitter: median(jitters),
-            loss: median(losses),
+            ..RobotEvidence::default()
+        })
+    }
+
+    /// The same with the links that a component's connections use; none, when none crosses.
+    fn robot_evidence(&self, component: &ComponentKey) -> RobotEvidence {
+        if self.host.is_none() {
+            return RobotEvidence::default();
         }
+        let partners = self.partners(component);
+        let used: Vec<LinkReport> = self
+            .mesh
+            .links()
+            .filter(|(robot, _)| self.mesh.is_alive(robot) && partners.contains(robot))
+            .map(|(_, link)| link)
+            .collect();
+        RobotEvidence {
+            delay: median(used.iter().map(|link| link.rtt / 2).collect()),
+            jitter: median(used.iter().map(|link| link.jitter).collect()),
+            loss: median(used.iter().map(|link| link.loss).collect()),
+            ..self.figures_of(&self.me).unwrap_or_default()
+        }
+    }
+
+    /// Homes of the components that a component talks with.
+    fn partners(&self, component: &ComponentKey) -> Vec<RobotId> {
+        let Some(system) = self.systems.get(&component.system) else { return Vec::new() };
+        let others = system.connections.iter().filter_map(|wire| {
+            let (from, to) = (&wire.from.component, &wire.to.component);
+            match (*from == component.name, *to == component.name) {
+                (true, false) => Some(to),
+                (false, true) => Some(from),
+                (true, true) | (false, false) => None,
+            }
+        });
+        others.filter_map(|name| self.home(&system.key(name)).cloned()).collect()
     }
 
     fn carry_out(&mut self, now: Instant, system: &Name, verdict: Verdict) {
@@ -176,6 +217,7 @@ impl Brain {
     fn restart(&mut self, now: Instant, verdict: &Verdict, after: Duration) {
         let key = &verdict.component;
         self.held.remove(key);
+        self.failed.remove(key);
         self.call_off(key);
         let text = format!("{}: {}", verdict.cause, verdict.reason);
         let event = Event::new("restart", &self.me, text).about(key);
@@ -284,14 +326,18 @@ impl Brain {
                 && is_event(condition.cause)
                 && condition.components.contains(&key.name)
         };
-        self.held.contains_key(key) || self.conditions.values().any(leaves)
+        self.held.contains_key(key)
+            || self.failed.contains(key)
+            || self.conditions.values().any(leaves)
     }
 
     /// Forgets the trouble of a component that has nothing to do here any more.
     pub(super) fn forget_here(&mut self, key: &ComponentKey) {
         self.restarts.remove(key);
         self.held.remove(key);
+        self.failed.remove(key);
         self.faults.remove(key);
+        self.said.forget_restarts(key);
         if let Some(engine) = self.engines.get_mut(&key.system) {
             engine.recovery.forget(key);
         }

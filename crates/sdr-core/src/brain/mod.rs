@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! handle(input) ─▶ take it in (mesh, instances, store, plans)
-//!               ─▶ settle:  role ─▶ decide ─▶ reconcile ─▶ judge ─▶ say ─▶ routes ─▶ store
-//!                           (who    (where    (what runs   (own     (what  (DDS)   (disk)
-//!                           leads)  things go) here)       trouble) I am)
+//!               ─▶ settle:  role ─▶ judge ─▶ decide ─▶ reconcile ─▶ say ─▶ routes ─▶ store
+//!                           (who   (own     (where     (what runs  (what  (DDS)   (disk)
+//!                           leads) trouble) things go) here)       I am)
 //! ```
 //!
 //! `decide` acts only on the coordinator, and only mints records; every robot `reconcile`s
@@ -90,6 +90,8 @@ pub struct Brain {
     conditions: BTreeMap<(Name, Cause), ConditionReport>,
     restarts: BTreeMap<ComponentKey, RestartPlan>,
     held: BTreeMap<ComponentKey, String>,
+    /// Components that failed here and wait for their ladder's word.
+    failed: BTreeSet<ComponentKey>,
     judge_due: bool,
     drains: BTreeMap<ComponentKey, Instant>,
 
@@ -148,6 +150,7 @@ impl Brain {
             conditions: BTreeMap::new(),
             restarts: BTreeMap::new(),
             held: BTreeMap::new(),
+            failed: BTreeSet::new(),
             judge_due: false,
             drains: BTreeMap::new(),
             plans: PlanDesk::default(),
@@ -232,14 +235,12 @@ impl Brain {
         self.mesh.handle_tick(now);
         self.take_news(now);
         self.consider_role(now);
-        self.decide(now);
-        self.reconcile(now);
+        // before anything is reconciled: what failed must not be started behind the ladder's back
         if self.judge_due || self.engines.values().any(|engine| engine.is_due(now)) {
             self.judge(now);
-            // a coordinator in trouble of its own helps itself without waiting for the next input
-            self.decide(now);
-            self.reconcile(now);
         }
+        self.decide(now);
+        self.reconcile(now);
         self.say(now);
         self.update_routes();
         self.store_if_dirty(now);

@@ -82,6 +82,8 @@ impl Brain {
             let Some(record) = record else { continue };
             let epoch = record.version.epoch.clone().filter(|_| !runs);
             records.push(record);
+            let until = now + self.not_back_for(key);
+            self.left.insert((key.clone(), from.clone()), until);
             self.moves
                 .insert(key.clone(), MoveWatch { since: now, from: Some(from.clone()), epoch });
             let text = format!("{from} -> {}: {reason}", placement.robot);
@@ -172,8 +174,6 @@ impl Brain {
             self.moves.remove(&key);
             let Some(home) = self.home(&key).cloned() else { continue };
             if let Some(from) = watch.from {
-                let until = now + self.not_back_for(&key);
-                self.left.insert((key.clone(), from.clone()), until);
                 let text = format!("{from} -> {home}");
                 let event = Event::new("moved", &self.me, text).about(&key);
                 let took = now.since(watch.since).as_secs_f64() * 1000.0;

@@ -25,6 +25,10 @@ const LINK_PERIOD: Duration = Duration::from_secs(2);
 const MEMORY_STEP: Bytes = Bytes(8_000_000);
 /// A change of CPU that is said at once, thousandths of a core.
 const CPU_STEP: u32 = 100;
+/// A change of a component's memory that is said within a second.
+const USAGE_MEMORY_STEP: Bytes = Bytes(500_000);
+/// A change of a component's CPU that is said within a second, thousandths of a core.
+const USAGE_CPU_STEP: u32 = 10;
 /// A change of the radio that is said at once, tenths of a dBm.
 const RSSI_STEP: u16 = 10;
 
@@ -36,7 +40,7 @@ const REFUSALS_TOLD: usize = 8;
 pub(super) struct Said {
     host: Option<(Instant, HostReport)>,
     links_at: Option<Instant>,
-    instances: BTreeMap<ComponentKey, InstanceReport>,
+    instances: BTreeMap<ComponentKey, (Instant, InstanceReport)>,
     restarts: BTreeMap<ComponentKey, u16>,
     calls: Calls,
 }
@@ -45,6 +49,15 @@ impl Said {
     pub(super) fn count_restart(&mut self, key: &ComponentKey) {
         let count = self.restarts.entry(key.clone()).or_default();
         *count = count.saturating_add(1);
+    }
+
+    /// A component begins anew, or left.
+    pub(super) fn forget_restarts(&mut self, key: &ComponentKey) {
+        self.restarts.remove(key);
+    }
+
+    pub(super) fn restarts_of(&self, key: &ComponentKey) -> u16 {
+        self.restarts.get(key).copied().unwrap_or(0)
     }
 
     pub(super) fn note_condition(&mut self, key: &ComponentKey, reason: &str, now: Instant) {
@@ -75,7 +88,7 @@ impl Brain {
     pub(super) fn say(&mut self, now: Instant) {
         self.update_readiness(now);
         self.unsay_unwanted();
-        self.say_instances();
+        self.say_instances(now);
         self.say_host(now);
         self.say_links(now);
     }
@@ -105,32 +118,34 @@ impl Brain {
     }
 
     /// States and tokens at once, figures when they changed enough.
-    fn say_instances(&mut self) {
+    fn say_instances(&mut self, now: Instant) {
         let mut spoken: BTreeSet<ComponentKey> = BTreeSet::new();
         let ids: Vec<InstanceId> = self.instances.keys().copied().collect();
         for id in ids {
-            let mut report = self.own_report(id);
+            let report = self.own_report(id);
             let key = report.component.clone();
             if self.instances[&id].is_ending() && self.current(&key).is_some() {
                 continue;
             }
             spoken.insert(key.clone());
-            if let Some(before) = self.said.instances.get(&key) {
-                report.usage = settled_usage(before.usage, report.usage);
-                if *before == report {
-                    continue;
+            let push = match self.said.instances.get(&key) {
+                None => Push::Now,
+                Some((_, before)) if !same_but_usage(before, &report) => Push::Now,
+                Some((at, before)) => {
+                    let due = now.since(*at) >= HOST_PERIOD;
+                    if !due || !usage_differs(before.usage, report.usage) {
+                        continue;
+                    }
+                    Push::WithGossip
                 }
-            }
-            self.said.instances.insert(key, report.clone());
-            self.mesh.report(&Report::Instance(report), Push::Now);
+            };
+            self.said.instances.insert(key, (now, report.clone()));
+            self.mesh.report(&Report::Instance(report), push);
         }
         let silent: Vec<ComponentKey> =
             self.said.instances.keys().filter(|key| !spoken.contains(key)).cloned().collect();
         for key in silent {
             self.said.instances.remove(&key);
-            if self.home(&key) != Some(&self.me) {
-                self.said.restarts.remove(&key);
-            }
             self.mesh.retract(&AuthorKey::instance(&key));
         }
     }
@@ -175,7 +190,7 @@ impl Brain {
             ready: instance.ready,
             usage: instance.usage,
             heard: instance.heard.iter().map(|(index, token)| (*index, token.clone())).collect(),
-            restarts: self.said.restarts.get(&instance.component).copied().unwrap_or(0),
+            restarts: self.said.restarts_of(&instance.component),
         }
     }
 
@@ -185,11 +200,14 @@ impl Brain {
     }
 }
 
-/// Keeps the figures said before while the new ones are close to them.
-fn settled_usage(before: Usage, now: Usage) -> Usage {
-    let memory = before.memory.0.abs_diff(now.memory.0) < MEMORY_STEP.0;
-    let cpu = before.cpu.0.abs_diff(now.cpu.0) < CPU_STEP;
-    if memory && cpu { before } else { now }
+fn same_but_usage(before: &InstanceReport, now: &InstanceReport) -> bool {
+    InstanceReport { usage: now.usage, ..before.clone() } == *now
+}
+
+/// Whether figures of a component are worth saying again.
+fn usage_differs(before: Usage, now: Usage) -> bool {
+    before.memory.0.abs_diff(now.memory.0) >= USAGE_MEMORY_STEP.0
+        || before.cpu.0.abs_diff(now.cpu.0) >= USAGE_CPU_STEP
 }
 
 fn differs(before: &HostReport, now: &HostReport) -> bool {

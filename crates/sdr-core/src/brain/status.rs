@@ -69,7 +69,9 @@ impl Brain {
             let consumer = system.key(&connection.to.component);
             let homes = (self.home(&producer), self.home(&consumer));
             let epoch = self.assignment(&producer).and_then(|(version, _)| version.epoch.clone());
-            let report = homes.1.and_then(|home| self.instance_report(home, &consumer));
+            let alive = |home: &&RobotId| self.mesh.is_alive(home);
+            let both = homes.0.filter(alive).and(homes.1.filter(alive));
+            let report = both.and_then(|home| self.instance_report(home, &consumer));
             let heard = report.zip(epoch).is_some_and(|(report, epoch)| {
                 let heard = report.heard.iter().find(|(index, _)| *index == connection.index);
                 heard.is_some_and(|(_, token)| token.epoch >= epoch)
@@ -92,11 +94,18 @@ impl Brain {
         let key = system.key(&spec.name);
         let wanted = self.wanted(&key);
         let home = wanted.map(|(_, assignment)| assignment.home.clone());
-        let report = home.as_ref().and_then(|home| self.instance_report(home, &key));
+        let alive = home.as_ref().is_some_and(|home| self.mesh.is_alive(home));
+        let report = home.as_ref().filter(|_| alive);
+        let report = report.and_then(|home| self.instance_report(home, &key));
         let epoch = wanted.and_then(|(version, _)| version.epoch.clone());
         let usage = report.as_ref().map(|report| report.usage).unwrap_or_default();
         let token = report.as_ref().and_then(|report| report.token.clone());
         let refusals = self.refusals_of(&key);
+        let restarts = match home.as_ref() == Some(&self.me) {
+            true => Some(self.said.restarts_of(&key)),
+            false => report.as_ref().map(|report| report.restarts),
+        };
+        let gone = home.as_ref().filter(|_| !alive).map(|home| format!("{home} is not heard"));
         let why = wanted.map(|(_, assignment)| assignment.reason.clone());
         let held = self.held.get(&key).map(|held| format!("held: {held}"));
         let call = self.is_given_up(&key).then(|| self.call_of(&key)).flatten();
@@ -107,7 +116,7 @@ impl Brain {
             epoch: epoch.as_ref().map_or(0, |epoch| epoch.number),
             epoch_minted_by: epoch.map(|epoch| epoch.minted_by.to_string()),
             run: token.map_or(0, |token| token.run),
-            restarts: report.map_or(0, |report| u32::from(report.restarts)),
+            restarts: restarts.map_or(0, u32::from),
             memory_bytes: usage.memory.0,
             cpu_permille: usage.cpu.0,
             standbys: wanted
@@ -115,7 +124,11 @@ impl Brain {
                     assignment.standbys.iter().map(ToString::to_string).collect()
                 })
                 .unwrap_or_default(),
-            reason: held.or(call).or(why).unwrap_or_else(|| String::from("not placed yet")),
+            reason: held
+                .or(call)
+                .or(gone)
+                .or(why)
+                .unwrap_or_else(|| String::from("not placed yet")),
             refusals,
         }
     }
