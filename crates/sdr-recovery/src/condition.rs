@@ -3,7 +3,7 @@
 use core::{fmt, time::Duration};
 
 use sdr_core::{
-    recover::Evidence,
+    recover::{Evidence, RobotEvidence},
     units::{Bytes, Dbm, Permille},
 };
 use serde::{Deserialize, Serialize};
@@ -101,21 +101,34 @@ impl Fact {
 
     /// Its value in `evidence`; `None` when unknown.
     pub(crate) fn read(self, evidence: &Evidence) -> Option<Level> {
-        let robot = &evidence.robot;
         match self {
-            Self::RobotMemoryFree => robot.memory_free.map(Level::Memory),
-            Self::RobotCpu => robot.cpu.map(Level::Share),
-            Self::RobotBattery => robot.battery.map(Level::Share),
-            Self::RobotRssi => robot.rssi.map(Level::Signal),
             Self::ComponentCpuOfLimit => {
                 let limit = evidence.cpu_limit.0.max(ONE_CORE);
                 let share = u64::from(evidence.cpu.0) * 1000 / u64::from(limit);
                 Some(Level::Share(Permille(u32::try_from(share).unwrap_or(u32::MAX))))
             }
             Self::ComponentCpuOfCore => Some(Level::Share(evidence.cpu)),
+            Self::RobotMemoryFree
+            | Self::RobotCpu
+            | Self::RobotBattery
+            | Self::RobotRssi
+            | Self::LinksDelay
+            | Self::LinksJitter
+            | Self::LinksLoss => self.read_robot(&evidence.robot),
+        }
+    }
+
+    /// Its value on a robot; `None` when unknown, and for facts of a component.
+    pub(crate) fn read_robot(self, robot: &RobotEvidence) -> Option<Level> {
+        match self {
+            Self::RobotMemoryFree => robot.memory_free.map(Level::Memory),
+            Self::RobotCpu => robot.cpu.map(Level::Share),
+            Self::RobotBattery => robot.battery.map(Level::Share),
+            Self::RobotRssi => robot.rssi.map(Level::Signal),
             Self::LinksDelay => robot.delay.map(Level::Time),
             Self::LinksJitter => robot.jitter.map(Level::Time),
             Self::LinksLoss => robot.loss.map(Level::Share),
+            Self::ComponentCpuOfLimit | Self::ComponentCpuOfCore => None,
         }
     }
 

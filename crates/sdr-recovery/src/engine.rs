@@ -5,7 +5,9 @@ use core::time::Duration;
 
 use sdr_core::{
     id::ComponentKey,
-    recover::{Cause, CauseStatus, Evidence, Fault, Recovery, RemedyOutcome, Verdict},
+    recover::{
+        Cause, CauseStatus, Evidence, Fault, Recovery, RemedyOutcome, RobotEvidence, Verdict,
+    },
     spec::PolicyBytes,
     time::Instant,
 };
@@ -243,6 +245,22 @@ impl Recovery for Engine {
             }
         }
         standing
+    }
+
+    fn has_rule(&self, cause: Cause) -> bool {
+        self.policy.parts().rules.iter().any(|rule| rule.cause == cause)
+    }
+
+    fn objection(&self, robot: &RobotEvidence) -> Option<(Cause, String)> {
+        self.policy.parts().rules.iter().find_map(|rule| {
+            let Trigger::Condition(condition) = rule.trigger else { return None };
+            let found = condition.fact.read_robot(robot)?;
+            let bar = condition.bar;
+            bar.holds(found.raw()).then(|| {
+                let (fact, bar) = (condition.fact.label(), bar.level());
+                (rule.cause, format!("{}: {fact} {found}, bar {bar}", rule.cause))
+            })
+        })
     }
 
     fn not_back_for(&self) -> Duration {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use sdr_core::recover::Cause;
 use sdr_tests::{
     fleet::{Behaviour, Fleet},
-    systems::{exploration, single},
+    systems::{allocation, exploration, recovery, single},
 };
 
 const LONG: Duration = Duration::from_secs(30);
@@ -85,6 +85,11 @@ fn a_crash_is_restarted_at_home_under_the_same_epoch_and_a_greater_run() {
 
     let camera = fleet.component("exploration", "camera").unwrap();
     assert_eq!((camera.home.as_deref(), camera.epoch, camera.run), (Some("robot-2"), 1, 2));
+    let launches: usize = fleet.robots.iter().map(|robot| robot.launches).sum();
+    assert_eq!(launches, 6, "one start for one crash\n{}", fleet.story());
+    let exited = fleet.events("exited")[0].0;
+    let started = fleet.events("started").last().unwrap().0;
+    assert!(started.since(exited) >= Duration::from_millis(200), "the backoff is kept");
 }
 
 #[test]
@@ -97,26 +102,120 @@ fn a_hang_is_killed_and_restarted() {
     assert_eq!(fleet.component("exploration", "controller").unwrap().run, 2);
 }
 
+fn crashing() -> Behaviour {
+    Behaviour { crash_after: Some(Duration::from_millis(200)), ..Behaviour::default() }
+}
+
 #[test]
 fn a_crash_loop_climbs_from_restarts_to_another_robot() {
     let mut fleet = Fleet::new(2, 6);
     fleet.run(Duration::from_secs(2));
-    let crashing =
-        Behaviour { crash_after: Some(Duration::from_millis(200)), ..Behaviour::default() };
-    fleet.robots[0].behaviours.insert("worker".into(), crashing);
-    let mut system = single(100);
-    system.components[0].place.labels.clear();
-    fleet.deploy(0, &system);
-    let first = fleet.home("alone", "worker");
+    fleet.robots[0].behaviours.insert("worker".into(), crashing());
+    fleet.deploy(0, &pinned_first());
+    fleet.run_until(LONG, "first home", |fleet| fleet.home("alone", "worker").is_some());
+    assert_eq!(fleet.home("alone", "worker").as_deref(), Some("robot-1"));
     fleet.run_until(Duration::from_secs(60), "settled on robot-2", |fleet| {
         fleet.home("alone", "worker").as_deref() == Some("robot-2") && fleet.is_running("alone")
     });
 
-    if first.as_deref() == Some("robot-1") {
-        assert!(fleet.events("restart").len() >= 3, "{}", fleet.story());
-    }
+    assert_eq!(fleet.events("restart").len(), 3, "{}", fleet.story());
+    assert_eq!(fleet.robots[0].launches, 4, "{}", fleet.story());
     fleet.run(Duration::from_secs(30));
     assert!(fleet.is_running("alone"), "{}", fleet.story());
+}
+
+/// A system whose policy takes the first robot that fits: the receiver.
+fn pinned_first() -> sdr_core::spec::SystemSpec {
+    let mut system = single(100);
+    system.allocation = allocation("exploration");
+    system
+}
+
+#[test]
+fn what_fails_on_every_robot_visits_each_once_and_stays() {
+    let mut fleet = Fleet::new(3, 16);
+    fleet.run(Duration::from_secs(2));
+    for robot in &mut fleet.robots {
+        robot.behaviours.insert("worker".into(), crashing());
+    }
+    fleet.deploy(0, &pinned_first());
+    fleet.run(Duration::from_secs(100));
+
+    let tried = fleet.robots.iter().filter(|robot| robot.launches > 0).count();
+    assert_eq!(tried, 3, "{}", fleet.story());
+    assert_eq!(fleet.events("move-started").len(), 2, "no way back for 2 min\n{}", fleet.story());
+}
+
+#[test]
+fn an_error_without_a_rule_is_held_and_said() {
+    let mut fleet = Fleet::new(2, 17);
+    fleet.run(Duration::from_secs(2));
+    let failing = Behaviour {
+        fail_after: Some((Duration::from_millis(300), Cause::AbnormalBehaviour)),
+        ..Behaviour::default()
+    };
+    fleet.robots[0].behaviours.insert("worker".into(), failing);
+    let mut system = pinned_first();
+    system.recovery = only_rssi();
+    fleet.deploy(0, &system);
+    fleet.run(Duration::from_secs(10));
+
+    let held = fleet.events("held");
+    assert_eq!(held.len(), 1, "{}", fleet.story());
+    assert!(held[0].1.reason.contains("no rule for abnormal-behaviour"), "{}", held[0].1.reason);
+    let worker = fleet.component("alone", "worker").unwrap();
+    assert!(worker.reason.contains("no rule"), "{}", worker.reason);
+}
+
+/// A policy that knows nothing but the radio.
+fn only_rssi() -> sdr_core::spec::PolicyBytes {
+    let read = sdr_recovery::Policy::decode(&recovery("exploration")).unwrap();
+    let mut parts = read.parts().clone();
+    parts.rules.retain(|rule| rule.cause == Cause::RssiLow);
+    sdr_recovery::Policy::new(parts).unwrap().encode()
+}
+
+#[test]
+fn a_rescue_does_not_go_where_recovery_would_act_at_once() {
+    let mut fleet = deployed(18);
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "moved", |fleet| fleet.events("moved").len() == 2);
+    fleet.switch_off(1);
+    fleet.run(Duration::from_secs(40));
+
+    for word in ["camera", "controller"] {
+        assert_ne!(
+            fleet.home("exploration", word).as_deref(),
+            Some("robot-1"),
+            "{}",
+            fleet.story()
+        );
+    }
+    let homeless = fleet.events("homeless");
+    assert!(
+        homeless.iter().any(|(_, event)| event.reason.contains("rssi-low")),
+        "{}",
+        fleet.story()
+    );
+}
+
+#[test]
+fn nothing_on_a_silent_robot_counts_as_active() {
+    let mut fleet = deployed(19);
+    fleet.switch_off(2);
+    fleet.run_until(LONG, "gone", |fleet| !fleet.events("robot-gone").is_empty());
+    let position = fleet.component("exploration", "position").unwrap();
+    assert_eq!(position.state, None, "{}", position.reason);
+}
+
+#[test]
+fn figures_of_components_are_known_on_every_robot() {
+    let fleet = deployed(20);
+    for robot in &fleet.robots {
+        for component in &robot.status(fleet.now).systems[0].components {
+            assert_eq!(component.memory_bytes, 512_000_000, "{}: {}", robot.id, component.name);
+        }
+    }
 }
 
 #[test]
