@@ -13,6 +13,7 @@ mod board;
 mod ending;
 mod fleet;
 mod need;
+mod out;
 mod stage;
 mod story;
 mod system;
@@ -27,12 +28,11 @@ use std::{
 use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
+use self::out::Out;
 use crate::{Session, failure::Failure};
 
 /// The robots of the demo, in the order of the paper.
 pub(crate) const ROBOTS: [&str; 3] = ["robot-1", "robot-2", "robot-3"];
-/// Highest number that is tried for a folder of reports.
-const FOLDERS_MAX: u32 = 10_000;
 
 /// Runs three robots, five components and one move on this machine.
 #[derive(Clone, Debug, Args)]
@@ -57,7 +57,7 @@ pub(crate) struct DemoArgs {
 /// What was asked for, checked.
 #[derive(Debug)]
 struct Plan {
-    out: PathBuf,
+    out: Out,
     coordinator: Option<String>,
     ballast: bool,
     images: Option<PathBuf>,
@@ -72,11 +72,9 @@ impl DemoArgs {
             None => None,
             Some(folder) => Some(pictures(&folder)?),
         };
-        let out = match self.out {
-            Some(out) => out,
-            None => free_folder(Path::new("."))?,
-        };
         let (coordinator, ballast) = (self.coordinator, !self.no_ballast);
+        need::check(ballast)?;
+        let out = Out::new(self.out, Path::new("."))?;
         Ok(Plan { out, coordinator, ballast, images, keep: self.keep, up: Cell::new(false) })
     }
 }
@@ -84,7 +82,6 @@ impl DemoArgs {
 /// Carries out `sdr demo`. A signal ends it at any moment, and whatever it made goes with it.
 pub(crate) async fn run(args: DemoArgs, session: &Session) -> Result<ExitCode, Failure> {
     let plan = args.checked()?;
-    need::check(plan.ballast)?;
     let stopped = stop_signal()?;
     tokio::select! {
         ended = story::play(&plan, session) => ended,
@@ -133,26 +130,9 @@ fn pictures(folder: &Path) -> Result<PathBuf, Failure> {
     )))
 }
 
-/// The first `sdr-demo-N` that is not there yet.
-fn free_folder(parent: &Path) -> Result<PathBuf, Failure> {
-    let folders = (1..=FOLDERS_MAX).map(|number| parent.join(format!("sdr-demo-{number}")));
-    let free = folders.into_iter().find(|folder| !folder.exists());
-    free.ok_or_else(|| {
-        Failure::Usage(format!("{FOLDERS_MAX} reports are here already; give --out DIR"))
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn reports_are_numbered_and_none_is_overwritten() {
-        let parent = tempfile::tempdir().unwrap();
-        assert!(free_folder(parent.path()).unwrap().ends_with("sdr-demo-1"));
-        std::fs::create_dir(parent.path().join("sdr-demo-1")).unwrap();
-        assert!(free_folder(parent.path()).unwrap().ends_with("sdr-demo-2"));
-    }
 
     #[test]
     fn a_folder_without_pictures_is_wrong_usage() {

@@ -220,7 +220,7 @@ impl Story<'_> {
         let mut recordings = Vec::new();
         for agent in &self.fleet.agents {
             let view: RecordingView = agent.client.get("/v1/recording").await?;
-            recordings.push(copy(&view.path, &self.plan.out)?);
+            recordings.push(copy(&view.path, self.plan.out.path())?);
         }
         let extra = self.extra(spec, until_ns);
         if !self.plan.keep {
@@ -231,11 +231,11 @@ impl Story<'_> {
         }
         let text =
             serde_json::to_string(&extra).map_err(|error| Failure::new(error.to_string()))?;
-        let file = self.plan.out.join(extra::FILE);
+        let file = self.plan.out.path().join(extra::FILE);
         std::fs::write(&file, text)
             .map_err(|error| Failure::new(format!("cannot write {}: {error}", file.display())))?;
         let report = Report::make(&recordings, extra)?;
-        let page = report.write(&self.plan.out)?;
+        let page = report.write(self.plan.out.path())?;
         self.board.finish(page.display().to_string(), Step::Report);
         self.board.show(self.session, &self.watch)?;
         let mut lines = ending::lines(&report, &page);
@@ -293,7 +293,7 @@ impl Story<'_> {
 fn copy(recording: &Path, out: &Path) -> Result<PathBuf, Failure> {
     let name = recording.file_name().unwrap_or_default();
     let to = out.join(name);
-    std::fs::create_dir_all(out).and_then(|()| std::fs::copy(recording, &to)).map_err(|error| {
+    std::fs::copy(recording, &to).map_err(|error| {
         Failure::new(format!("cannot copy {} to {}: {error}", recording.display(), to.display()))
     })?;
     Ok(to)
