@@ -142,7 +142,7 @@ impl Brain {
             let list = avoid.entry(name.clone()).or_default();
             list.extend(ill.iter().cloned());
             for (robot, condition) in &calls {
-                let robot_wide = !super::judge::is_event(condition.cause);
+                let robot_wide = !super::conditions::is_event(condition.cause);
                 if robot_wide || condition.components.contains(name) {
                     list.push((robot.clone(), condition.cause.to_string()));
                 }

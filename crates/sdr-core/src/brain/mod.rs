@@ -10,9 +10,11 @@
 //! `decide` acts only on the coordinator, and only mints records; every robot `reconcile`s
 //! what should be on itself with what is. Nothing is ever told to another robot but records.
 
+mod conditions;
 mod config;
 mod decide;
 mod effects;
+mod evidence;
 mod gone;
 mod instances;
 mod judge;
