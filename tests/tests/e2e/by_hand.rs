@@ -101,7 +101,7 @@ fn logs_are_found_from_any_robot_and_undeploy_leaves_no_process() {
 }
 
 #[test]
-fn a_component_that_only_dies_is_seen_with_its_last_words_and_held() {
+fn a_component_that_only_dies_is_seen_with_its_last_words_and_laddered() {
     let house = House::start(1);
     let script = r#"#!/bin/sh
 if [ "$1" = --describe ]; then
@@ -125,4 +125,29 @@ exit 3
     });
     let exited = &house.agents[0].events("exited")[0].event.reason;
     assert!(exited.contains('3') && exited.contains("I will not start"), "{exited}");
+}
+
+#[test]
+fn a_component_that_never_connects_is_seen_ended_and_laddered() {
+    let house = House::start(1);
+    let script = r#"#!/bin/sh
+if [ "$1" = --describe ]; then
+  echo '{"name": "mute", "inputs": [], "outputs": []}'
+  exit 0
+fi
+exec sleep 1000
+"#;
+    house.agents[0].install_script("mute", script);
+    let file = house.folder().join("mute.yaml");
+    let text = "system: mute\ncomponents:\n  mute:\n    run: { native: mute }\n    needs: { memory: 10MB, cpu: 5% }\n";
+    std::fs::write(&file, text).unwrap();
+    let output = house.agents[0].sdr(&["deploy", file.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    house.wait("a process", |house| house.agents[0].component_pid("mute").is_some());
+    let first = house.agents[0].component_pid("mute").unwrap();
+
+    house.wait("hung, then restarted", |house| {
+        !house.agents[0].events("hung").is_empty() && !house.agents[0].events("restart").is_empty()
+    });
+    house.wait("the mute process ended", |_| !is_running(first));
 }

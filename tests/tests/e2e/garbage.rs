@@ -5,9 +5,31 @@ use std::{
     io::{Read, Write},
     net::UdpSocket,
     os::unix::net::UnixStream,
+    path::Path,
 };
 
-use sdr_tests::house::{House, exploration};
+use sdr_tests::house::{Agent, House, exploration};
+use serde_json::Value;
+
+/// What an HTTP request of these bytes is answered with.
+fn ask(socket: &Path, request: &[u8]) -> String {
+    let mut stream = UnixStream::connect(socket).unwrap();
+    stream.write_all(request).unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+fn health(agent: &Agent) -> Value {
+    let answer = ask(&agent.socket(), b"GET /v1/health HTTP/1.0\r\nHost: x\r\n\r\n");
+    serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap_or("")).unwrap()
+}
+
+/// A line on the components' socket that no component would send; the answer.
+fn lie_to_component_socket(agent: &Agent) -> String {
+    let socket = agent.socket().with_extension("components.sock");
+    ask(&socket, b"{\"v\": 1, \"hello\": [nonsense\n")
+}
 
 #[test]
 fn garbage_on_every_door_disturbs_nobody() {
@@ -23,12 +45,20 @@ fn garbage_on_every_door_disturbs_nobody() {
             let noise: Vec<u8> = (0..=250u8).cycle().step_by(37).take(length).collect();
             socket.send_to(&noise, ("127.0.0.1", agent.port)).unwrap();
         }
-        let mut api = UnixStream::connect(agent.socket()).unwrap();
-        api.write_all(b"\x00\xffnot http at all\r\n\r\n").unwrap();
-        let mut answer = Vec::new();
-        let _ = api.read_to_end(&mut answer);
+        let refused = ask(&agent.socket(), b"POST /v1/deploy HTTP/1.0\r\nContent-Length: 9\r\nContent-Type: application/json\r\n\r\n{\"a\": [}]");
+        assert!(refused.contains(" 400 ") && refused.contains("error"), "{refused}");
+        let told = lie_to_component_socket(agent);
+        assert!(told.contains("error"), "{told}");
     }
 
+    for agent in &house.agents {
+        house.wait("all of it counted", |_| {
+            let health = health(agent);
+            health["mesh"]["malformed"].as_u64() >= Some(4)
+                && health["bad_input"]["datagrams_oversized"].as_u64() >= Some(2)
+                && health["bad_input"]["component_lines_bad"].as_u64() >= Some(1)
+        });
+    }
     house.wait("still running", |house| (0..3).all(|number| house.is_running(number)));
     let again: Vec<_> = house.agents.iter().map(|agent| agent.pid()).collect();
     assert_eq!(pids, again);

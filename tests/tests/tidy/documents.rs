@@ -124,3 +124,42 @@ fn the_component_in_the_readme_is_the_one_that_is_compiled() {
     let findings: Vec<String> = strange.map(str::to_owned).collect();
     expect_none("lines that the doc test of sdr-component does not have", &findings);
 }
+
+/// First words in quotes behind calls that make an event.
+fn event_kinds(text: &str) -> Vec<String> {
+    const CALLS: [&str; 5] =
+        ["Event::new(", ".event(", ".event_about(", "Occurrence::new(", "let kind = match state {"];
+    let mut kinds = Vec::new();
+    for call in CALLS {
+        for rest in text.split(call).skip(1) {
+            let quoted =
+                rest.trim_start().strip_prefix('"').and_then(|word| word.split('"').next());
+            kinds.extend(quoted.map(str::to_owned));
+        }
+    }
+    kinds
+}
+
+#[test]
+fn every_event_stands_in_the_contract() {
+    let contract = std::fs::read_to_string(root().join("docs/events.md")).unwrap();
+    let mut findings = Vec::new();
+    let mut seen = 0;
+    for page in pages().iter().filter(|page| page.path.ends_with(".rs")) {
+        let of_agents = page.path.starts_with("crates/sdr-core/src/brain")
+            || page.path.starts_with("crates/sdr-agent/src");
+        if !of_agents || page.path.contains("test") {
+            continue;
+        }
+        for kind in event_kinds(&page.text) {
+            seen += 1;
+            let listed = contract.contains(&format!("`{kind}`"));
+            // a message of the event stream itself, not an event
+            if !listed && !contract.contains(&format!("`event: {kind}`")) {
+                findings.push(format!("{}: {kind}", page.path));
+            }
+        }
+    }
+    assert!(seen > 25, "the search found only {seen} events: has their making changed?");
+    expect_none("events that docs/events.md does not list", &findings);
+}
