@@ -11,7 +11,7 @@ use sdr_component::{Component, ComponentError, Context, OutPort, Outcome, Setup}
 use sdr_lab::device::CameraClient;
 use sdr_lab::optics::Picture;
 
-use super::{DEVICE_TIMEOUT, Pictures};
+use super::{DEVICE_TIMEOUT, Pictures, Unreadable};
 
 /// Which camera it is.
 pub trait Optics: 'static {
@@ -93,11 +93,13 @@ impl<O: Optics> Component for Eye<O> {
         Ok(Self { image, place, source: None, optics: PhantomData })
     }
 
-    fn on_initialize(&mut self, _: &mut Context<'_>) -> Outcome {
+    fn on_initialize(&mut self, context: &mut Context<'_>) -> Outcome {
         self.source = Some(match &self.place {
             Place::Device(path) => Source::Device(Box::new(connect(path)?)),
             Place::Folder { folder, width, height } => {
-                Source::Folder(Pictures::open(folder, (*width, *height))?)
+                let skipped =
+                    &mut |one: &Unreadable| context.log(format_args!("passed over: {one}"));
+                Source::Folder(Pictures::open(folder, (*width, *height), skipped)?)
             }
         });
         Ok(())
@@ -110,7 +112,10 @@ impl<O: Optics> Component for Eye<O> {
                 send::<O>(&self.image, &frame.picture, frame.stamp_ns)
             }
             Some(Source::Folder(pictures)) => {
-                send::<O>(&self.image, pictures.next_picture()?, context.now_ns())
+                let skipped =
+                    &mut |one: &Unreadable| context.log(format_args!("passed over: {one}"));
+                let picture = pictures.next_picture(skipped)?;
+                send::<O>(&self.image, picture, context.now_ns())
             }
             None => Err(ComponentError::other("never initialised")),
         }

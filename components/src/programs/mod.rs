@@ -10,7 +10,7 @@ mod wheels;
 pub use anomaly::Anomaly;
 pub use controller::MotionController;
 pub use eye::{Eye, FisheyeCamera, Optics, PerspectiveCamera};
-pub use pictures::{Pictures, PicturesError};
+pub use pictures::{Pictures, PicturesError, Unreadable};
 pub use position::PositionEstimation;
 
 use std::time::Duration;

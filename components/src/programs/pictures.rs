@@ -31,19 +31,34 @@ pub enum PicturesError {
         /// How many there are.
         found: usize,
     },
-    /// A file that is no picture.
-    #[error("cannot read the picture {}: {source}", file.display())]
-    File {
-        /// Which one.
-        file: PathBuf,
-        /// What the decoder said.
-        source: image::ImageError,
+    /// None of them can be read.
+    #[error("none of the {found} pictures in {} can be read; the last: {last}", folder.display())]
+    Unreadable {
+        /// As given.
+        folder: PathBuf,
+        /// How many there are.
+        found: usize,
+        /// Why the last one cannot.
+        last: Unreadable,
     },
 }
 
+/// A file that is passed over because it is no picture.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot read the picture {}: {source}", file.display())]
+pub struct Unreadable {
+    /// Which one.
+    pub file: PathBuf,
+    /// What the decoder said.
+    pub source: image::ImageError,
+}
+
 /// Shows the pictures of a folder in the order of their names, scaled to one size.
+///
+/// A file that cannot be read is told once and passed over; that none can be read is an error.
 #[derive(Debug)]
 pub struct Pictures {
+    folder: PathBuf,
     files: Vec<PathBuf>,
     size: (u32, u32),
     kept: Vec<Picture>,
@@ -53,8 +68,12 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Lists the folder and reads its first picture.
-    pub fn open(folder: &Path, size: (u32, u32)) -> Result<Self, PicturesError> {
+    /// Lists the folder and reads its first picture; `skipped` hears of those before it.
+    pub fn open(
+        folder: &Path,
+        size: (u32, u32),
+        skipped: &mut dyn FnMut(&Unreadable),
+    ) -> Result<Self, PicturesError> {
         let failed = |source| PicturesError::Folder { folder: folder.to_owned(), source };
         let mut files = Vec::new();
         for entry in std::fs::read_dir(folder).map_err(failed)? {
@@ -68,24 +87,50 @@ impl Pictures {
             return Err(PicturesError::Count { folder: folder.to_owned(), found });
         }
         files.sort();
-        let first = read(&files[0], size)?;
-        Ok(Self { files, size, kept: vec![first], next: 0, passing: Picture::default() })
+        let (folder, passing) = (folder.to_owned(), Picture::default());
+        let mut pictures = Self { folder, files, size, kept: Vec::new(), next: 0, passing };
+        let first = pictures.readable(skipped)?;
+        pictures.kept.push(first);
+        Ok(pictures)
     }
 
-    /// The next picture; after the last comes the first.
-    pub fn next_picture(&mut self) -> Result<&Picture, PicturesError> {
-        let index = self.next;
-        if index >= self.kept.len() {
-            let picture = read(&self.files[index], self.size)?;
-            if index >= KEPT_MAX {
+    /// The next picture; after the last comes the first. `skipped` hears of those passed over.
+    pub fn next_picture(
+        &mut self,
+        skipped: &mut dyn FnMut(&Unreadable),
+    ) -> Result<&Picture, PicturesError> {
+        if self.next >= self.kept.len() {
+            let picture = self.readable(skipped)?;
+            // Passing over the last file leads back to the first, which is kept already.
+            if self.next == self.kept.len() && self.next < KEPT_MAX {
+                self.kept.push(picture);
+            } else {
                 self.passing = picture;
-                self.next = (index + 1) % self.files.len();
+                self.next = (self.next + 1) % self.files.len();
                 return Ok(&self.passing);
             }
-            self.kept.push(picture);
         }
+        let index = self.next;
         self.next = (index + 1) % self.files.len();
         Ok(&self.kept[index])
+    }
+
+    /// Reads the file whose turn it is, or the next one that can be read; the others are dropped.
+    fn readable(&mut self, skipped: &mut dyn FnMut(&Unreadable)) -> Result<Picture, PicturesError> {
+        let found = self.files.len();
+        loop {
+            let unreadable = match read(&self.files[self.next], self.size) {
+                Ok(picture) => return Ok(picture),
+                Err(unreadable) => unreadable,
+            };
+            skipped(&unreadable);
+            self.files.remove(self.next);
+            if self.files.is_empty() {
+                let folder = self.folder.clone();
+                return Err(PicturesError::Unreadable { folder, found, last: unreadable });
+            }
+            self.next %= self.files.len();
+        }
     }
 }
 
@@ -94,8 +139,8 @@ fn is_picture(path: &Path) -> bool {
     ["png", "jpg", "jpeg"].iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-fn read(file: &Path, (width, height): (u32, u32)) -> Result<Picture, PicturesError> {
-    let failed = |source| PicturesError::File { file: file.to_owned(), source };
+fn read(file: &Path, (width, height): (u32, u32)) -> Result<Picture, Unreadable> {
+    let failed = |source| Unreadable { file: file.to_owned(), source };
     let opened = image::ImageReader::open(file).map_err(|source| failed(source.into()))?;
     // What is in the file counts, whatever its name ends in.
     let guessed = opened.with_guessed_format().map_err(|source| failed(source.into()))?;
@@ -128,11 +173,11 @@ mod tests {
             paint(folder.path(), name, red);
         }
         std::fs::write(folder.path().join("notes.txt"), "no picture").unwrap();
-        let mut pictures = Pictures::open(folder.path(), (8, 6)).unwrap();
+        let mut pictures = Pictures::open(folder.path(), (8, 6), &mut never).unwrap();
 
         let mut reds = Vec::new();
         for _ in 0..4 {
-            let picture = pictures.next_picture().unwrap();
+            let picture = pictures.next_picture(&mut never).unwrap();
             assert_eq!((picture.width, picture.height, picture.rgb.len()), (8, 6, 144));
             reds.push(picture.rgb[0]);
         }
@@ -141,15 +186,47 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_without_pictures_and_a_broken_picture_are_named() {
+    fn an_unreadable_picture_is_told_once_and_passed_over() {
         let folder = tempfile::tempdir().unwrap();
-        let empty = Pictures::open(folder.path(), (8, 6)).unwrap_err().to_string();
+        for name in ["a.png", "c.png", "e.png"] {
+            std::fs::write(folder.path().join(name), "no picture").unwrap();
+        }
+        paint(folder.path(), "b.png", 1);
+        paint(folder.path(), "d.png", 2);
+        let mut told = Vec::new();
+        let mut note = |one: &Unreadable| told.push(one.to_string());
+
+        let mut pictures = Pictures::open(folder.path(), (8, 6), &mut note).unwrap();
+        let mut reds = Vec::new();
+        for _ in 0..5 {
+            reds.push(pictures.next_picture(&mut note).unwrap().rgb[0]);
+        }
+
+        // The file at the end is found to be none when its turn comes; the first comes instead.
+        assert_eq!(reds, [1, 2, 1, 2, 1]);
+        assert_eq!(told.len(), 3, "{told:?}");
+        for (line, name) in told.iter().zip(["a.png", "c.png", "e.png"]) {
+            assert!(line.contains(name), "{line}");
+        }
+    }
+
+    #[test]
+    fn a_folder_with_nothing_to_show_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let reason = |path: &Path| {
+            Pictures::open(path, (8, 6), &mut |_| {}).map(drop).unwrap_err().to_string()
+        };
+        let empty = reason(folder.path());
         assert!(empty.contains("has 0 pictures"), "{empty}");
-        let missing = Pictures::open(&folder.path().join("x"), (8, 6)).unwrap_err().to_string();
+        let missing = reason(&folder.path().join("x"));
         assert!(missing.contains("cannot read the folder"), "{missing}");
 
         std::fs::write(folder.path().join("a.png"), "no picture").unwrap();
-        let broken = Pictures::open(folder.path(), (8, 6)).unwrap_err().to_string();
-        assert!(broken.contains("a.png"), "{broken}");
+        let broken = reason(folder.path());
+        assert!(broken.contains("none of the 1 pictures") && broken.contains("a.png"), "{broken}");
+    }
+
+    fn never(one: &Unreadable) {
+        panic!("{one}");
     }
 }

@@ -14,6 +14,7 @@ mod ending;
 mod fleet;
 mod need;
 mod out;
+mod pictures;
 mod stage;
 mod story;
 mod system;
@@ -28,7 +29,7 @@ use std::{
 use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
-use self::out::Out;
+use self::{out::Out, pictures::Folder as PictureFolder};
 use crate::{Session, failure::Failure};
 
 /// The robots of the demo, in the order of the paper.
@@ -60,7 +61,7 @@ struct Plan {
     out: Out,
     coordinator: Option<String>,
     ballast: bool,
-    images: Option<PathBuf>,
+    images: Option<PictureFolder>,
     keep: bool,
     /// The fleet was left up as wished: the signal that ends it is no failure.
     up: Cell<bool>,
@@ -70,7 +71,7 @@ impl DemoArgs {
     fn checked(self) -> Result<Plan, Failure> {
         let images = match self.images {
             None => None,
-            Some(folder) => Some(pictures(&folder)?),
+            Some(folder) => Some(PictureFolder::new(&folder)?),
         };
         let (coordinator, ballast) = (self.coordinator, !self.no_ballast);
         need::check(ballast)?;
@@ -109,41 +110,4 @@ fn stop_signal() -> Result<impl Future<Output = &'static str>, Failure> {
             _ = hangup.recv() => "the terminal closed",
         }
     })
-}
-
-/// The folder with its real path, when there is a picture in it.
-fn pictures(folder: &Path) -> Result<PathBuf, Failure> {
-    let wrong =
-        |error: std::io::Error| Failure::Usage(format!("--images {}: {error}", folder.display()));
-    let is_picture = |path: &Path| {
-        let word = path.extension().and_then(|word| word.to_str()).map(str::to_ascii_lowercase);
-        matches!(word.as_deref(), Some("png" | "jpg" | "jpeg"))
-    };
-    for entry in std::fs::read_dir(folder).map_err(wrong)? {
-        if is_picture(&entry.map_err(wrong)?.path()) {
-            return std::fs::canonicalize(folder).map_err(wrong);
-        }
-    }
-    let folder = folder.display();
-    Err(Failure::Usage(format!(
-        "--images {folder}: no picture there; allowed: a folder with *.png, *.jpg or *.jpeg"
-    )))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_folder_without_pictures_is_wrong_usage() {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("notes.txt"), "x").unwrap();
-        match pictures(folder.path()) {
-            Err(Failure::Usage(text)) => assert!(text.contains("*.png"), "{text}"),
-            other => panic!("{other:?}"),
-        }
-        assert!(matches!(pictures(&folder.path().join("no")), Err(Failure::Usage(_))));
-        std::fs::write(folder.path().join("A.PNG"), "x").unwrap();
-        assert!(pictures(folder.path()).is_ok());
-    }
 }

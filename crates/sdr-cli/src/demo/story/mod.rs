@@ -62,7 +62,10 @@ pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Fai
     let bodies = stage.bodies(&world);
     let fleet = Fleet::start(folder.path(), &bodies, plan.coordinator.as_deref())?;
     let board = Board::new(session, BARS);
-    let watch = Watch::default();
+    let mut watch = Watch::default();
+    if let Some(images) = &plan.images {
+        watch.say("cameras", &images.sentence());
+    }
     let coordinator = Coordinator::default();
     let mut story = Story { fleet, stage, folder, board, watch, plan, session, coordinator };
     story.meet().await?;
@@ -127,7 +130,8 @@ impl Story<'_> {
         let available: Available = client.get("/v1/components").await?;
         // No policy lies in a folder that is not there: the built-in ones are taken.
         let empty = self.folder.path().join("empty");
-        let (ballast, images) = (self.plan.ballast, self.plan.images.as_deref());
+        let (ballast, images) =
+            (self.plan.ballast, self.plan.images.as_ref().map(|one| one.path.as_path()));
         let spec = system::make(&available.components, &empty, ballast, images)?;
         let since = Instant::now();
         let request = DeployRequest { system: spec.clone() };
