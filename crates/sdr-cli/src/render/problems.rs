@@ -1,7 +1,7 @@
 //! What is wrong in a view of the fleet, in sentences.
 
 use sdr_core::{
-    api::{ComponentView, StatusView, SystemView},
+    api::{ComponentView, RobotView, StatusView, SystemView},
     lifecycle::LifecycleState,
 };
 
@@ -44,18 +44,18 @@ impl Problem {
 
 /// What is not as it should be; empty when all is well.
 pub(crate) fn problems(view: &StatusView) -> Vec<Problem> {
-    let mut problems = Vec::new();
+    let mut problems: Vec<Problem> = unled(view).into_iter().collect();
     for system in &view.systems {
         let parts = system.components.iter();
         problems.extend(parts.filter_map(|component| trouble(component, system, view)));
-        problems.extend(silent_connections(system));
+        problems.extend(silent_connections(system, view));
     }
     let raised = view.conditions.iter().filter(|condition| condition.raised);
     problems.extend(raised.map(|condition| {
         Problem::new(format!(
             "{} of {} on {}, raised after {}: {}",
             condition.cause,
-            condition.component,
+            named(&condition.system, &condition.component, view),
             view.seen_from,
             span(condition.hold_ms),
             condition.reason
@@ -71,15 +71,41 @@ pub(crate) fn problems(view: &StatusView) -> Vec<Problem> {
             megabytes(robot.memory_free_bytes)
         ))
     }));
-    if view.coordinator.is_none() {
-        problems.push(Problem::new(format!("{} knows no coordinator", view.seen_from)));
-    }
     problems
+}
+
+/// Nobody leads: no coordinator is known, or it is quiet while something wants a home.
+fn unled(view: &StatusView) -> Option<Problem> {
+    let mut parts = view.systems.iter().flat_map(|system| &system.components);
+    let waiting = parts.any(|component| component.home.is_none());
+    let text = match &view.coordinator {
+        Some(name) => {
+            let quiet = |robot: &&RobotView| waiting && robot.name == *name && !robot.alive;
+            let since = span(view.robots.iter().find(quiet)?.seen_ms);
+            format!(
+                "coordinator {name} is quiet for {since}: nothing is placed until another takes \
+                 the role"
+            )
+        }
+        None if waiting => {
+            format!("{} knows no coordinator: nothing is placed until one is there", view.seen_from)
+        }
+        None => format!("{} knows no coordinator", view.seen_from),
+    };
+    Some(Problem::new(text))
+}
+
+/// A component or connection; where several systems are, the system stands before it.
+fn named(system: &str, word: &str, view: &StatusView) -> String {
+    match view.systems.len() {
+        0 | 1 => word.to_owned(),
+        _ => format!("{system}/{word}"),
+    }
 }
 
 /// Why a component does not do its work, when it does not.
 fn trouble(component: &ComponentView, system: &SystemView, view: &StatusView) -> Option<Problem> {
-    let name = &component.name;
+    let name = named(&system.name, &component.name, view);
     let Some(home) = &component.home else {
         let mut problem = Problem::new(format!("{name} has no home: {}", component.reason));
         let refusals = component.refusals.iter();
@@ -95,7 +121,7 @@ fn trouble(component: &ComponentView, system: &SystemView, view: &StatusView) ->
         Some(state) => format!("{name} is {} on {home} ({reason})", state_words(state)),
         None => format!("{name} does not run yet on {home} ({reason})"),
     };
-    let (system, component) = (system.name.clone(), name.clone());
+    let (system, component) = (system.name.clone(), component.name.clone());
     let placed = Placed { system, component, home: home.clone() };
     Some(Problem { component: Some(placed), ..Problem::new(text) })
 }
@@ -112,7 +138,10 @@ pub(crate) fn state_words(state: LifecycleState) -> String {
 }
 
 /// Connections between active components that carry nothing.
-fn silent_connections(system: &SystemView) -> impl Iterator<Item = Problem> {
+fn silent_connections<'a>(
+    system: &'a SystemView,
+    view: &'a StatusView,
+) -> impl Iterator<Item = Problem> + 'a {
     let active = |end: &str| {
         let name = end.split('.').next().unwrap_or(end).trim();
         system.components.iter().any(|component| component.name == name && is_active(component))
@@ -121,7 +150,8 @@ fn silent_connections(system: &SystemView) -> impl Iterator<Item = Problem> {
         !connection.heard && connection.name.split("->").all(|end| active(end.trim()))
     });
     silent.map(|connection| {
-        Problem::new(format!("{}: both ends are active, no sample arrived yet", connection.name))
+        let name = named(&system.name, &connection.name, view);
+        Problem::new(format!("{name}: both ends are active, no sample arrived yet"))
     })
 }
 

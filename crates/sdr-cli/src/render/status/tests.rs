@@ -106,3 +106,36 @@ fn a_condition_is_wrong_once_it_is_raised_and_shown_before() {
     let raised = "! memory-short of camera on robot-2, raised after 2.0 s: free 80 MB, bar 100 MB";
     assert!(text(&view).starts_with(raised), "{}", text(&view));
 }
+
+#[test]
+fn among_several_systems_a_component_is_named_with_its_own() {
+    let mut view = fixture::fleet();
+    let mut other = fixture::exploration();
+    other.name = "survey".into();
+    other.components[0].state = Some(LifecycleState::Inactive);
+    other.connections[4].heard = false;
+    view.systems.push(other);
+
+    let found = problems(&view);
+
+    assert!(found[0].text.starts_with("survey/fisheye is inactive on robot-3"), "{found:?}");
+    assert_eq!(found[0].component.as_ref().map(|one| one.component.as_str()), Some("fisheye"));
+    assert!(found[1].text.starts_with("survey/controller.wheels -> position.wheels: "));
+}
+
+#[test]
+fn a_quiet_coordinator_is_named_as_the_reason_why_nothing_is_placed() {
+    let mut view = fixture::fleet();
+    view.robots[1].alive = false;
+    view.robots[1].seen_ms = 7_000;
+    let line =
+        "coordinator robot-2 is quiet for 7.0 s: nothing is placed until another takes the role";
+    assert!(problems(&view).iter().all(|problem| problem.text != line), "all are placed");
+
+    fixture::make_homeless(&mut view.systems[0].components[4]);
+    assert_eq!(problems(&view)[0].text, line);
+
+    view.coordinator = None;
+    let none = "robot-2 knows no coordinator: nothing is placed until one is there";
+    assert_eq!(problems(&view)[0].text, none);
+}
