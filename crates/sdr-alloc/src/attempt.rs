@@ -206,16 +206,24 @@ impl<'a> Attempt<'a> {
         reasons
     }
 
-    /// Robots that fit but have a smaller score.
+    /// Robots that fit but have no greater score.
     fn outscored(&self, scored: &[(usize, i64)], chosen: usize, best: Option<i64>) -> Vec<Refusal> {
         let robots = &self.facts.robots;
+        let best = best.unwrap_or(0);
+        let bar = |score: i64| {
+            let (most, robot) = (thousandths(best), &robots[chosen].robot);
+            match score == best {
+                true => format!("more than {most}: {robot} has as much and is asked first"),
+                false => format!("{most} on {robot}"),
+            }
+        };
         let others = scored.iter().filter(|(robot, _)| *robot != chosen).take(REFUSALS_MAX);
         others
             .map(|(robot, score)| Refusal {
                 robot: robots[*robot].robot.clone(),
                 constraint: "score".into(),
                 found: thousandths(*score),
-                bar: format!("{} on {}", thousandths(best.unwrap_or(0)), robots[chosen].robot),
+                bar: bar(*score),
             })
             .collect()
     }

@@ -55,7 +55,7 @@ fn words(question: Question<'_>, failure: &Failure<'_>) -> (&'static str, String
     let robots = &question.facts.robots;
     let offer = robots[question.robot];
     match failure {
-        Failure::Avoid(reason) => ("avoid", (*reason).to_string(), "another robot".into()),
+        Failure::Avoid(reason) => ("avoid", (*reason).to_string(), "a robot without that".into()),
         Failure::Pinned => {
             let wanted = item.place.robot.as_ref().or(item.component.scope.as_ref());
             let wanted = wanted.map_or(String::new(), ToString::to_string);

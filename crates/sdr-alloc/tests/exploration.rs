@@ -93,7 +93,7 @@ fn both_leave_for_the_robot_that_holds_both_under_relaxed_bars() {
     assert_eq!(
         why,
         [
-            "robot-1: avoid left for rssi-low 0 s ago, bar another robot",
+            "robot-1: avoid left for rssi-low 0 s ago, bar a robot without that",
             "robot-2: memory_free -220 MB with anomaly, bar 250 MB"
         ]
     );
@@ -107,7 +107,7 @@ fn strict_bars_have_no_answer_to_the_same_question() {
     assert_eq!(
         reasons(&plan.homeless[0]),
         [
-            "robot-1: avoid left for rssi-low 0 s ago, bar another robot",
+            "robot-1: avoid left for rssi-low 0 s ago, bar a robot without that",
             "robot-2: memory_free 310 MB, bar 500 MB",
             "robot-3: memory_free 310 MB, bar 500 MB"
         ]
@@ -137,7 +137,7 @@ fn a_group_that_fits_nowhere_whole_is_spread_and_one_too_many_stays_homeless() {
     assert_eq!(homes(&plan), ["fisheye: robot-2"]);
     assert_eq!(
         sdr_alloc::homeless_line(&plan.homeless[0]),
-        "exploration/anomaly has no home; robot-1: avoid left for rssi-low 0 s ago, bar another \
-         robot; robot-2: memory_free -220 MB, bar 250 MB; robot-3: memory_free 170 MB, bar 250 MB"
+        "exploration/anomaly has no home; robot-1: avoid left for rssi-low 0 s ago, bar a robot \
+         without that; robot-2: memory_free -220 MB, bar 250 MB; robot-3: memory_free 170 MB, bar 250 MB"
     );
 }

@@ -130,6 +130,9 @@ fn what_runs_somewhere_stays_there_when_staying_weighs_enough() {
 fn equal_scores_go_to_the_first_by_name() {
     let plan = solve(&problem(&only(|_| {}), three(), vec![item("a")]));
     assert_eq!(homes(&plan), ["a: robot-1"]);
+    let why = plan.placements[0].refusals[0].to_string();
+    assert!(why.starts_with("robot-2: score "), "{why}");
+    assert!(why.ends_with(": robot-1 has as much and is asked first"), "{why}");
 }
 
 #[test]
