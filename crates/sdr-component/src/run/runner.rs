@@ -180,16 +180,16 @@ impl<C: Component> Runner<C> {
     }
 
     pub(super) fn report_state(&self) {
-        self.link.outbox.say(FromComponent::State(StateReport {
-            state: self.life.state(),
-            token: self.token.clone(),
-            fault: self.fault.clone(),
-        }));
+        let state = self.life.state();
+        // An old fault told with another state would count as a second one.
+        let fault = self.fault.clone().filter(|_| state == LifecycleState::Error);
+        let token = self.token.clone();
+        self.link.outbox.say(FromComponent::State(StateReport { state, token, fault }));
     }
 
     /// Goes to the error state.
     pub(super) fn fail(&mut self, fault: Fault) {
-        crate::log(format_args!("{}: error: {}: {}", C::NAME, fault.cause, fault.reason));
+        crate::log(format_args!("{}: {}: {}", C::NAME, fault.cause, fault.reason));
         let Ok(owed) = self.life.take(Transition::Fail) else { return };
         self.silence();
         self.fault = Some(fault);

@@ -171,6 +171,22 @@ fn a_raised_fault_and_a_panic_lead_to_the_error_state_with_their_reasons() {
 }
 
 #[test]
+fn a_fault_is_told_with_the_error_and_not_again_with_the_end() {
+    let agent = Agent::new();
+    let process = agent.start(None);
+    let (mut line, _) = agent.greet();
+    let mut configure = agent.configure(ExecutionSetup::OnData);
+    configure.parameters.insert(String::from("factor"), Value::Int(0));
+    line.say(&ToComponent::Configure(Box::new(configure)));
+    assert!(line.until_state(LifecycleState::Error).fault.is_some());
+
+    line.order(Order::Finish);
+
+    assert_eq!(line.until_state(LifecycleState::Finalized).fault, None);
+    assert!(process.wait().success());
+}
+
+#[test]
 fn a_component_that_cannot_initialise_says_why_and_comes_up_after_a_reset() {
     let agent = Agent::new();
     let _process = agent.start(None);
