@@ -9,9 +9,10 @@ use rustix::mm::{Advice, MapFlags, ProtFlags, madvise, mmap_anonymous, munmap};
 
 /// What goes before the payload of every sample, as it stands in shared memory.
 ///
-/// Fixed for one version of the programs of a robot: all of them are installed together.
+/// Fixed: `docs/protocol.md` tells it to other languages. Another layout gets another name.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[type_name("sdr.SampleHeader.v1")]
 pub struct SampleHeader {
     /// Number of the epoch under which the producer is active.
     pub epoch: u64,

@@ -130,3 +130,27 @@ fn a_place_that_cannot_work_is_refused_before_anything_is_made() {
     let wide = SharedMemory { prefix: "p".repeat(13), root: PathBuf::from("/dev/shm/x") };
     assert!(matches!(Memory::open(&wide, "t"), Err(ShmError::PrefixTooLong { .. })));
 }
+
+#[test]
+fn the_header_is_what_the_protocol_promises_to_other_languages() {
+    let place = Place::new();
+    let memory = Memory::open(&place.memory, "test").unwrap();
+    let (samples, _) = memory.services("a/b/c", 8).unwrap();
+
+    let types = samples.static_config().message_type_details();
+
+    let header = types.user_header;
+    assert_eq!(header.type_name().to_string(), "sdr.SampleHeader.v1");
+    assert_eq!((header.size(), header.alignment()), (72, 8));
+    assert_eq!((types.payload.type_name().to_string(), types.payload.size()), ("u8".into(), 1));
+    let offsets = [
+        std::mem::offset_of!(SampleHeader, epoch),
+        std::mem::offset_of!(SampleHeader, minted_by),
+        std::mem::offset_of!(SampleHeader, run),
+        std::mem::offset_of!(SampleHeader, flags),
+        std::mem::offset_of!(SampleHeader, sequence),
+        std::mem::offset_of!(SampleHeader, tick),
+        std::mem::offset_of!(SampleHeader, source_time_ns),
+    ];
+    assert_eq!(offsets, [0, 8, 40, 44, 48, 56, 64]);
+}
