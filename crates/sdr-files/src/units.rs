@@ -181,11 +181,20 @@ impl Family {
         Ok(if negative { -(scaled / divisor) } else { scaled / divisor })
     }
 
-    /// The unit's size, or the nearest unit.
+    /// The same word in another case, else the first unit that goes on from it (`M`: `MB`), else
+    /// the nearest.
+    fn meant(&self, unit: &str) -> Option<&'static str> {
+        let words = || self.units.iter().map(|(word, _)| *word);
+        let begun = |word: &&str| word.to_lowercase().starts_with(&unit.to_lowercase());
+        let same = words().find(|word| word.eq_ignore_ascii_case(unit));
+        same.or_else(|| words().find(begun)).or_else(|| nearest(unit, words()))
+    }
+
+    /// The unit's size, or the unit that was probably meant.
     fn factor(&self, unit: &str) -> Result<u64, Option<&'static str>> {
         match self.units.iter().find(|(word, _)| *word == unit) {
             Some((_, factor)) => Ok(*factor),
-            None => Err(nearest(unit, self.units.iter().map(|(word, _)| *word))),
+            None => Err(self.meant(unit)),
         }
     }
 }
@@ -222,5 +231,18 @@ mod tests {
         assert!(matches!(period("0Hz"), Err(UnitError::OutOfRange { .. })));
         let text = size("530Mb").unwrap_err().to_string();
         assert_eq!(text, "`530Mb` has the unknown unit `Mb` (did you mean `MB`?)");
+    }
+
+    #[test]
+    fn half_a_unit_is_gone_on_with_rather_than_changed() {
+        let meant = |error: UnitError| match error {
+            UnitError::UnknownUnit { meant, .. } => meant,
+            other => panic!("{other}"),
+        };
+        assert_eq!(meant(size("530M").unwrap_err()), Some("MB"));
+        assert_eq!(meant(size("1g").unwrap_err()), Some("GB"));
+        assert_eq!(meant(distance_mm("3M").unwrap_err()), Some("m"));
+        assert_eq!(meant(period("15hz").unwrap_err()), Some("Hz"));
+        assert_eq!(meant(size("5XB").unwrap_err()), Some("B"));
     }
 }
