@@ -1,5 +1,6 @@
 //! The timers of one process: what is waited for, since when, for how long.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use sdr_core::{lifecycle::LifecycleState, spec::Execution, time::Instant};
@@ -13,11 +14,21 @@ const BEATS_MISSED_MAX: u32 = 5;
 #[derive(Debug)]
 pub(super) struct Life {
     patience: Patience,
-    /// Longest pause between two beats.
+    /// Longest pause between two beats while active.
     beat_max: Duration,
+    /// Longest pause between two beats while inactive.
+    beat_idle_max: Duration,
     phase: Phase,
-    /// When the phase, or in [`Phase::Active`] the last beat, was.
+    /// When the phase, or the last beat in it, was.
     since: Instant,
+    /// Orders that were sent and not answered; they are carried out one after the other.
+    orders: VecDeque<&'static str>,
+    /// Since when the first of them is waited for.
+    order_since: Instant,
+    /// Since when it has no connection, once it had one.
+    unlinked_at: Option<Instant>,
+    /// Whether it was seen initialised.
+    initialized: bool,
     /// Whether the present delay was told.
     told: bool,
 }
@@ -28,10 +39,14 @@ enum Phase {
     Starting,
     /// It was configured; `on_initialize` runs.
     Initializing,
-    /// Inactive, in error or finalised: nothing is due.
-    Quiet,
+    /// Beats are due, a few.
+    Inactive,
     /// Beats are due.
     Active,
+    /// The brain knows and orders what is to be done.
+    Error,
+    /// It ended by itself; its process should, too.
+    Finalized,
     /// It was asked to finish; SIGTERM is next.
     Finishing,
     /// SIGTERM was sent; SIGKILL is next.
@@ -51,14 +66,45 @@ pub(super) enum Overdue {
     Kill,
 }
 
+/// One thing that is waited for.
+#[derive(Clone, Copy, Debug)]
+struct Wait {
+    since: Instant,
+    limit: Duration,
+    what: What,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum What {
+    Greeting,
+    Initialized,
+    Answer(&'static str),
+    Beat,
+    Connection,
+    Exit,
+    Terminate,
+    Kill,
+}
+
 impl Life {
     pub(super) fn new(patience: Patience, execution: Execution, now: Instant) -> Self {
         let period = match execution {
             Execution::Periodic { period } => period,
             Execution::OnData => Duration::ZERO,
         };
-        let beat_max = patience.beat.max(period.saturating_mul(BEATS_MISSED_MAX));
-        Self { patience, beat_max, phase: Phase::Starting, since: now, told: false }
+        let missed_max = period.saturating_mul(BEATS_MISSED_MAX);
+        Self {
+            patience,
+            beat_max: patience.beat.max(missed_max),
+            beat_idle_max: patience.beat_idle.max(missed_max),
+            phase: Phase::Starting,
+            since: now,
+            orders: VecDeque::new(),
+            order_since: now,
+            unlinked_at: None,
+            initialized: false,
+            told: false,
+        }
     }
 
     /// `configure` was sent.
@@ -66,23 +112,58 @@ impl Life {
         self.enter(Phase::Initializing, now);
     }
 
+    /// An order was sent.
+    pub(super) fn ordered(&mut self, what: &'static str, now: Instant) {
+        if self.orders.is_empty() {
+            self.order_since = now;
+        }
+        self.orders.push_back(what);
+    }
+
     /// It said which state it is in.
     pub(super) fn state(&mut self, state: LifecycleState, now: Instant) {
         let phase = match state {
             LifecycleState::Created => return,
+            LifecycleState::Inactive => Phase::Inactive,
             LifecycleState::Active => Phase::Active,
-            LifecycleState::Inactive | LifecycleState::Error | LifecycleState::Finalized => {
-                Phase::Quiet
-            }
+            LifecycleState::Error => Phase::Error,
+            LifecycleState::Finalized => Phase::Finalized,
         };
+        self.answered(now);
+        self.initialized |= matches!(phase, Phase::Inactive | Phase::Active);
         self.enter(phase, now);
+    }
+
+    /// It said a state or refused: its oldest order is settled.
+    pub(super) fn answered(&mut self, now: Instant) {
+        // The first state answers `configure`; orders that came with it begin only now.
+        if self.phase != Phase::Initializing {
+            self.orders.pop_front();
+        }
+        self.order_since = now;
+        // What ran until now kept beats away.
+        self.restart_beats(now);
     }
 
     /// Its execution thread gave a sign of life.
     pub(super) fn beat(&mut self, now: Instant) {
-        if self.phase == Phase::Active {
-            self.since = now;
+        if matches!(self.phase, Phase::Inactive | Phase::Active) && self.orders.is_empty() {
             self.told = false;
+        }
+        self.restart_beats(now);
+    }
+
+    /// Its connection was lost; what was ordered on it may never have come.
+    pub(super) fn unlinked(&mut self, now: Instant) {
+        self.orders.clear();
+        self.unlinked_at.get_or_insert(now);
+    }
+
+    /// It connected, anew or at first.
+    pub(super) fn linked(&mut self, now: Instant) {
+        if self.unlinked_at.take().is_some() {
+            self.told = false;
+            self.restart_beats(now);
         }
     }
 
@@ -101,63 +182,117 @@ impl Life {
         self.enter(Phase::Killed, now);
     }
 
-    /// The agent itself was late: beats may lie unread, so their window starts anew.
+    /// The agent itself was late: beats, answers and greetings may lie unread, so their
+    /// windows start anew.
     pub(super) fn forgive(&mut self, now: Instant) {
-        if self.phase == Phase::Active {
-            self.since = now;
-        }
+        self.order_since = now;
+        self.unlinked_at = self.unlinked_at.map(|_| now);
+        self.restart_beats(now);
     }
 
     /// Whether it is on its way out.
     pub(super) fn is_ending(&self) -> bool {
         match self.phase {
             Phase::Finishing | Phase::Terminating | Phase::Killed => true,
-            Phase::Starting | Phase::Initializing | Phase::Quiet | Phase::Active => false,
+            Phase::Starting
+            | Phase::Initializing
+            | Phase::Inactive
+            | Phase::Active
+            | Phase::Error
+            | Phase::Finalized => false,
         }
     }
 
     /// What is overdue at `now`; each delay is told once.
     pub(super) fn overdue(&mut self, now: Instant) -> Option<Overdue> {
-        if self.deadline().is_none_or(|deadline| now < deadline) {
-            return None;
-        }
+        let wait = self.wait().filter(|wait| !self.told && now >= wait.since + wait.limit)?;
         self.told = true;
-        let waited = now.since(self.since).as_secs_f64();
-        match self.phase {
-            Phase::Starting => Some(Overdue::Hung(format!("no greeting for {waited:.1} s"))),
-            Phase::Initializing => {
-                Some(Overdue::Hung(format!("on_initialize not done after {waited:.1} s")))
-            }
-            Phase::Active => Some(Overdue::Hung(format!(
-                "no beat of its execution thread for {waited:.1} s, allowed {:.1} s",
-                self.beat_max.as_secs_f64()
-            ))),
-            Phase::Finishing => Some(Overdue::Terminate),
-            Phase::Terminating => Some(Overdue::Kill),
-            Phase::Quiet | Phase::Killed => None,
-        }
+        let waited = now.since(wait.since).as_secs_f64();
+        let reason = match wait.what {
+            What::Greeting => format!("no greeting for {waited:.1} s"),
+            What::Initialized => format!("on_initialize not done after {waited:.1} s"),
+            What::Answer(order) => format!("`{order}` not answered by a state for {waited:.1} s"),
+            What::Beat => format!(
+                "no beat of its execution thread for {waited:.1} s, allowed {:.1} s{}",
+                wait.limit.as_secs_f64(),
+                if self.unlinked_at.is_some() { "; its connection is closed" } else { "" }
+            ),
+            What::Connection => format!("connection closed and not opened again for {waited:.1} s"),
+            What::Exit => format!("finalized, but its process goes on for {waited:.1} s"),
+            What::Terminate => return Some(Overdue::Terminate),
+            What::Kill => return Some(Overdue::Kill),
+        };
+        Some(Overdue::Hung(reason))
     }
 
     /// When to look at [`Self::overdue`] at the latest.
     pub(super) fn deadline(&self) -> Option<Instant> {
-        if self.told {
-            return None;
-        }
-        let patience = match self.phase {
-            Phase::Starting => self.patience.hello,
-            Phase::Initializing => self.patience.initialize,
-            Phase::Active => self.beat_max,
-            Phase::Finishing => self.patience.finish,
-            Phase::Terminating => self.patience.terminate,
-            Phase::Quiet | Phase::Killed => return None,
+        let wait = self.wait().filter(|_| !self.told)?;
+        Some(wait.since + wait.limit)
+    }
+
+    /// What is due first.
+    fn wait(&self) -> Option<Wait> {
+        let patience = &self.patience;
+        let (limit, what) = match self.phase {
+            Phase::Starting => (patience.hello, What::Greeting),
+            Phase::Initializing => (patience.initialize, What::Initialized),
+            Phase::Inactive | Phase::Active | Phase::Error if !self.orders.is_empty() => {
+                return self.sooner(self.wait_for_answer());
+            }
+            Phase::Inactive => (self.beat_idle_max, What::Beat),
+            Phase::Active => (self.beat_max, What::Beat),
+            Phase::Finalized => (patience.order, What::Exit),
+            Phase::Finishing => (patience.finish, What::Terminate),
+            Phase::Terminating => (patience.terminate, What::Kill),
+            Phase::Error => return self.sooner(None),
+            Phase::Killed => return None,
         };
-        Some(self.since + patience)
+        self.sooner(Some(Wait { since: self.since, limit, what }))
+    }
+
+    /// The callback of an order keeps beats away; it has a limit of its own.
+    fn wait_for_answer(&self) -> Option<Wait> {
+        let order = self.orders.front()?;
+        // `reset` of one that never came up initialises it.
+        let limit = if self.initialized { self.patience.order } else { self.patience.initialize };
+        Some(Wait { since: self.order_since, limit, what: What::Answer(order) })
+    }
+
+    /// `wait`, or the new connection when that is due before.
+    fn sooner(&self, wait: Option<Wait>) -> Option<Wait> {
+        let matters = match self.phase {
+            Phase::Initializing | Phase::Inactive | Phase::Active | Phase::Error => true,
+            Phase::Starting
+            | Phase::Finalized
+            | Phase::Finishing
+            | Phase::Terminating
+            | Phase::Killed => false,
+        };
+        let limit = self.patience.reconnect;
+        let connection = self.unlinked_at.filter(|_| matters).map(|since| Wait {
+            since,
+            limit,
+            what: What::Connection,
+        });
+        wait.into_iter().chain(connection).min_by_key(|wait| wait.since + wait.limit)
+    }
+
+    fn restart_beats(&mut self, now: Instant) {
+        if matches!(self.phase, Phase::Inactive | Phase::Active) {
+            self.since = now;
+        }
     }
 
     fn enter(&mut self, phase: Phase, now: Instant) {
         // News of a component that is being ended do not stop its end.
         let rank = |phase| match phase {
-            Phase::Starting | Phase::Initializing | Phase::Quiet | Phase::Active => 0,
+            Phase::Starting
+            | Phase::Initializing
+            | Phase::Inactive
+            | Phase::Active
+            | Phase::Error
+            | Phase::Finalized => 0,
             Phase::Finishing => 1,
             Phase::Terminating => 2,
             Phase::Killed => 3,
@@ -171,71 +306,4 @@ impl Life {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn life(period_ms: u64) -> Life {
-        let period = Duration::from_millis(period_ms);
-        Life::new(Patience::default(), Execution::Periodic { period }, Instant::ZERO)
-    }
-
-    fn at(ms: u64) -> Instant {
-        Instant::from_millis(ms)
-    }
-
-    #[test]
-    fn a_component_that_never_greets_is_told_once() {
-        let mut life = life(20);
-        assert_eq!(life.overdue(at(9_999)), None);
-        assert!(matches!(life.overdue(at(10_000)), Some(Overdue::Hung(_))));
-        assert_eq!(life.overdue(at(99_000)), None);
-        assert_eq!(life.deadline(), None);
-    }
-
-    #[test]
-    fn initialising_may_take_a_minute() {
-        let mut life = life(20);
-        life.configured(at(1_000));
-        assert_eq!(life.overdue(at(60_999)), None);
-        assert!(matches!(life.overdue(at(61_000)), Some(Overdue::Hung(_))));
-    }
-
-    #[test]
-    fn beats_are_due_while_active_and_only_then() {
-        let mut life = life(500);
-        life.state(LifecycleState::Inactive, at(0));
-        assert_eq!(life.deadline(), None);
-
-        life.state(LifecycleState::Active, at(0));
-        assert_eq!(life.deadline(), Some(at(2_500)));
-        life.beat(at(400));
-        assert_eq!(life.overdue(at(2_899)), None);
-        assert!(matches!(life.overdue(at(2_900)), Some(Overdue::Hung(_))));
-
-        life.beat(at(3_000));
-        assert_eq!(life.deadline(), Some(at(5_500)));
-    }
-
-    #[test]
-    fn an_agent_that_slept_judges_nobody() {
-        let mut life = life(20);
-        life.state(LifecycleState::Active, at(0));
-        life.forgive(at(30_000));
-        assert_eq!(life.overdue(at(30_000)), None);
-    }
-
-    #[test]
-    fn asking_comes_before_telling_and_telling_before_killing() {
-        let mut life = life(20);
-        life.state(LifecycleState::Active, at(0));
-        life.finish(at(100));
-        life.state(LifecycleState::Active, at(200));
-        life.finish(at(900));
-        assert_eq!(life.overdue(at(1_100)), Some(Overdue::Terminate));
-        life.terminated(at(1_100));
-        assert_eq!(life.overdue(at(3_099)), None);
-        assert_eq!(life.overdue(at(3_100)), Some(Overdue::Kill));
-        life.killed(at(3_100));
-        assert_eq!(life.deadline(), None);
-    }
-}
+mod tests;

@@ -177,7 +177,11 @@ impl Keeper {
     /// Sends an order, now or as soon as the component has greeted and was configured.
     async fn tell(&mut self, order: Order) {
         if self.link.is_some() && self.configured {
+            let what = word(&order);
             self.send(ToComponent::Command(order)).await;
+            if let Some(what) = what.filter(|_| self.link.is_some()) {
+                self.life.ordered(what, clock::now());
+            }
             return;
         }
         if self.pending.len() == PENDING_MAX {
@@ -191,7 +195,7 @@ impl Keeper {
         if let Err(error) = socket::say(&mut link.stream, &message).await {
             let component = &self.order.component;
             tracing::warn!(event = "component-deaf", %component, %error, next = "await its greeting");
-            self.link = None;
+            self.unlink();
         }
     }
 
@@ -199,6 +203,7 @@ impl Keeper {
     async fn greeted(&mut self, greeting: Greeting) {
         let Greeting { stream, buffer, hello } = greeting;
         self.link = Some(Link { stream, buffer });
+        self.life.linked(clock::now());
         self.shared.outlets.types.learn(&self.order, &hello.profile);
         if hello.now.state == LifecycleState::Created {
             if !self.configured {
@@ -220,6 +225,11 @@ impl Keeper {
         self.read_lines().await;
     }
 
+    fn unlink(&mut self) {
+        self.link = None;
+        self.life.unlinked(clock::now());
+    }
+
     fn configure(&self) -> Configure {
         let spec = &self.order.spec;
         let config = &self.shared.config;
@@ -239,12 +249,12 @@ impl Keeper {
 
     async fn received(&mut self, received: io::Result<usize>) {
         match received {
-            Ok(0) => self.link = None,
+            Ok(0) => self.unlink(),
             Ok(_) => self.read_lines().await,
             Err(error) => {
                 let component = &self.order.component;
                 tracing::debug!(event = "link-broken", %component, %error);
-                self.link = None;
+                self.unlink();
             }
         }
     }
@@ -258,7 +268,7 @@ impl Keeper {
                     let message = format!("{}: {error}", self.order.component);
                     self.shared.outlets.trouble.count(Kind::ComponentLine, &message);
                     self.send(ToComponent::Error(ErrorReport { message })).await;
-                    self.link = None;
+                    self.unlink();
                 }
             }
         }
@@ -280,6 +290,7 @@ impl Keeper {
             FromComponent::Error(report) => {
                 let component = &self.order.component;
                 tracing::warn!(event = "component-says", %component, "{}", report.message);
+                self.life.answered(clock::now());
             }
         }
     }
@@ -335,5 +346,15 @@ impl Keeper {
         self.shared.journal.remove(instance);
         self.shared.outlets.watch.remove(instance, &self.shared.outlets.record);
         self.shared.tell(instance, InstanceNews::Exited { reason }).await;
+    }
+}
+
+/// The order's name when a state must answer it; the end has limits of its own.
+fn word(order: &Order) -> Option<&'static str> {
+    match order {
+        Order::Activate { .. } => Some("activate"),
+        Order::Deactivate => Some("deactivate"),
+        Order::Reset => Some("reset"),
+        Order::Finish => None,
     }
 }

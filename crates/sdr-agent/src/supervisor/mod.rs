@@ -77,6 +77,12 @@ pub(crate) struct Patience {
     pub(crate) initialize: Duration,
     /// Between two beats while active, at least; five periods when that is longer.
     pub(crate) beat: Duration,
+    /// Between two beats while inactive, likewise.
+    pub(crate) beat_idle: Duration,
+    /// From an order to the state that answers it, and from `finalized` to the exit.
+    pub(crate) order: Duration,
+    /// From the end of a connection to the next greeting.
+    pub(crate) reconnect: Duration,
     /// From `finish` to SIGTERM.
     pub(crate) finish: Duration,
     /// From SIGTERM to SIGKILL.
@@ -89,6 +95,9 @@ impl Default for Patience {
             hello: Duration::from_secs(10),
             initialize: Duration::from_secs(60),
             beat: Duration::from_secs(1),
+            beat_idle: Duration::from_secs(3),
+            order: Duration::from_secs(15),
+            reconnect: Duration::from_secs(3),
             finish: Duration::from_secs(1),
             terminate: Duration::from_secs(2),
         }

@@ -2,7 +2,9 @@
 
 use std::env;
 use std::io::{Read as _, Write as _};
+use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
+use std::time::Duration;
 
 use sdr_component::protocol::{
     Beat, Counters, ENV_COMPONENT, ENV_INSTANCE, ENV_ORPHAN_MS, ENV_SOCKET, FromComponent, Hello,
@@ -78,7 +80,12 @@ impl Body {
                 assert_eq!(configure.devices["wheels"], "/dev/wheels0");
                 self.manner = configure.parameters["manner"].to_string();
                 self.say(&FromComponent::State(report(LifecycleState::Inactive, None)));
+                if self.manner == "gone" {
+                    self.stream.shutdown(Shutdown::Both).unwrap();
+                    std::thread::sleep(Duration::from_secs(1000));
+                }
             }
+            ToComponent::Command(Order::Activate { .. }) if self.manner == "stubborn" => {}
             ToComponent::Command(Order::Activate { token }) => self.activate(token),
             ToComponent::Command(Order::Finish) if self.manner == "deaf" => {}
             ToComponent::Command(Order::Finish) => std::process::exit(0),
