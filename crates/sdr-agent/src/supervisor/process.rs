@@ -94,10 +94,49 @@ fn describe(status: ExitStatus) -> String {
     use std::os::unix::process::ExitStatusExt as _;
     match (status.code(), status.signal()) {
         (Some(code), _) => format!("exit status {code}"),
-        (None, Some(number)) => match Signal::from_named_raw(number) {
-            Some(signal) => format!("killed by signal {number} ({signal:?})"),
+        (None, Some(number)) => match signal_name(number) {
+            Some(name) => format!("killed by signal {number} ({name})"),
             None => format!("killed by signal {number}"),
         },
         (None, None) => format!("{status}"),
+    }
+}
+
+/// Those that end a process, as signal(7) numbers them on x86 and ARM.
+fn signal_name(number: i32) -> Option<&'static str> {
+    Some(match number {
+        1 => "SIGHUP",
+        2 => "SIGINT",
+        3 => "SIGQUIT",
+        4 => "SIGILL",
+        5 => "SIGTRAP",
+        6 => "SIGABRT",
+        7 => "SIGBUS",
+        8 => "SIGFPE",
+        9 => "SIGKILL",
+        10 => "SIGUSR1",
+        11 => "SIGSEGV",
+        12 => "SIGUSR2",
+        13 => "SIGPIPE",
+        14 => "SIGALRM",
+        15 => "SIGTERM",
+        24 => "SIGXCPU",
+        25 => "SIGXFSZ",
+        31 => "SIGSYS",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::process::ExitStatusExt as _;
+
+    use super::*;
+
+    #[test]
+    fn an_end_by_a_signal_is_told_by_its_usual_name() {
+        assert_eq!(describe(ExitStatus::from_raw(9)), "killed by signal 9 (SIGKILL)");
+        assert_eq!(describe(ExitStatus::from_raw(34)), "killed by signal 34");
+        assert_eq!(describe(ExitStatus::from_raw(7 << 8)), "exit status 7");
     }
 }
