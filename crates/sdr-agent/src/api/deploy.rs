@@ -4,9 +4,8 @@ use std::time::Duration;
 
 use axum::Json;
 use axum::body::Bytes;
-use axum::extract::rejection::BytesRejection;
-use axum::extract::{Path, State};
-use axum::http::StatusCode;
+use axum::extract::{FromRequest as _, Path, Request, State};
+use axum::http::{StatusCode, header};
 use sdr_core::{
     api::{DeployAnswer, DeployRequest},
     id::Name,
@@ -22,13 +21,15 @@ const ANSWER_MAX: Duration = Duration::from_secs(10);
 
 pub(super) async fn deploy(
     State(state): State<ApiState>,
-    body: Result<Bytes, BytesRejection>,
+    request: Request,
 ) -> Result<Json<DeployAnswer>, Refusal> {
+    // Before the body is waited for: it may never come.
+    if announced(&request).is_some_and(|length| length > BODY_BYTES_MAX) {
+        return Err(too_large());
+    }
+    let body = Bytes::from_request(request, &()).await;
     let body = body.map_err(|rejection| match rejection.status() {
-        StatusCode::PAYLOAD_TOO_LARGE => Refusal::new(
-            StatusCode::PAYLOAD_TOO_LARGE,
-            format!("the body is larger than {BODY_BYTES_MAX} bytes"),
-        ),
+        StatusCode::PAYLOAD_TOO_LARGE => too_large(),
         _ => Refusal::bad(&state, rejection.body_text()),
     })?;
     let request: DeployRequest = serde_json::from_slice(&body).map_err(|error| {
@@ -41,6 +42,16 @@ pub(super) async fn deploy(
     // What was installed a moment ago counts.
     state.installed.refresh(Look::Thorough).await.map_err(|LoopEnded| Refusal::stopping())?;
     ask(&state, |request_id| Input::Deploy { request: request_id, system: request.system }).await
+}
+
+/// The length of the body as its head says.
+fn announced(request: &Request) -> Option<usize> {
+    request.headers().get(header::CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
+}
+
+fn too_large() -> Refusal {
+    let error = format!("the body is larger than {BODY_BYTES_MAX} bytes");
+    Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, error)
 }
 
 pub(super) async fn undeploy(

@@ -178,17 +178,15 @@ async fn every_refusal_is_json_that_says_what_is_allowed() {
 }
 
 #[tokio::test]
-async fn a_body_beyond_the_bound_is_refused() {
+async fn a_body_beyond_the_bound_is_refused_before_it_comes() {
     let bench = Bench::new().await;
     let mut client = Client::connect(&bench.api.path).unwrap();
     let length = BODY_BYTES_MAX + 1;
     let head = "POST /v1/deploy HTTP/1.1\r\nhost: x\r\ncontent-length";
 
     let read = tokio::task::spawn_blocking(move || {
-        let body = vec![b' '; length];
+        // Not a byte of the body follows.
         client.write_all(format!("{head}: {length}\r\n\r\n").as_bytes()).unwrap();
-        // The server may hang up before the end.
-        let _ = client.write_all(&body);
         let mut bytes = [0; 4096];
         let length = client.read(&mut bytes).unwrap();
         String::from_utf8_lossy(&bytes[..length]).into_owned()
