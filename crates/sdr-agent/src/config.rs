@@ -86,6 +86,8 @@ pub(crate) fn metrics(config: &RobotConfig) -> MetricsConfig {
     MetricsConfig {
         period: config.radio.period,
         memory_capacity: memory_capacity(config),
+        memory_reserve: config.capacity.memory.is_none().then_some(config.capacity.reserve_memory),
+        all_cpu: config.capacity.cpu.is_none(),
         radio: Some(Radio { file, interface: config.radio.interface.clone() }),
         sensors: Sensors { battery, position },
     }

@@ -15,7 +15,13 @@ use std::io;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use sdr_core::{input::Input, recording::RobotMetrics, report::HostReport, units::Bytes};
+use sdr_core::{
+    input::Input,
+    recording::RobotMetrics,
+    report::HostReport,
+    time::Instant,
+    units::{Bytes, Permille},
+};
 use tokio::sync::mpsc;
 
 use crate::clock;
@@ -36,6 +42,11 @@ pub(crate) struct MetricsConfig {
     pub(crate) period: Duration,
     /// What components may use in all.
     pub(crate) memory_capacity: Bytes,
+    /// What of the machine's memory is not for components, when all the rest is: then what
+    /// other programs use counts, too. `None` when robot.toml gives the capacity.
+    pub(crate) memory_reserve: Option<Bytes>,
+    /// Whether the machine's CPU use counts, not only that of the agent's tree.
+    pub(crate) all_cpu: bool,
     /// Where the radio level is read.
     pub(crate) radio: Option<Radio>,
     /// Where the rest is read.
@@ -58,7 +69,8 @@ impl Metrics {
         record: RecordSender,
     ) -> io::Result<Self> {
         let sampler = Sampler::new()?;
-        let desk = Desk { config, watch: watch.clone(), inputs, record, sampler };
+        let machine = host::Machine::new(clock::now());
+        let desk = Desk { config, watch: watch.clone(), inputs, record, sampler, machine };
         let thread = thread::Builder::new().name("metrics".into()).spawn(move || desk.run())?;
         Ok(Self { watch, thread: Some(thread) })
     }
@@ -80,6 +92,7 @@ struct Desk {
     inputs: mpsc::Sender<Input>,
     record: RecordSender,
     sampler: Sampler,
+    machine: host::Machine,
 }
 
 impl Desk {
@@ -108,11 +121,11 @@ impl Desk {
         }
     }
 
-    fn report_host(&self, sample: &Sample) -> HostReport {
+    fn report_host(&mut self, sample: &Sample) -> HostReport {
         let now = clock::now();
         let host = HostReport {
-            memory_used: sample.memory,
-            cpu_used: sample.cpu,
+            memory_used: self.memory_used(sample),
+            cpu_used: self.cpu_used(now, sample),
             battery: self.config.sensors.battery(now),
             rssi: self.config.radio.as_ref().and_then(Radio::level),
             position: self.config.sensors.position(now),
@@ -120,6 +133,20 @@ impl Desk {
         let now_ns = now.as_nanos();
         self.record.record(now_ns, &self.message(now_ns, &host, sample));
         host
+    }
+
+    fn memory_used(&mut self, sample: &Sample) -> Bytes {
+        let Some(reserve) = self.config.memory_reserve else { return sample.memory };
+        let available = self.machine.memory_available();
+        host::memory_used(self.config.memory_capacity, sample.memory, available, reserve)
+    }
+
+    fn cpu_used(&mut self, now: Instant, sample: &Sample) -> Permille {
+        if !self.config.all_cpu {
+            return sample.cpu;
+        }
+        // The two are measured at different moments: whatever is more is true.
+        self.machine.cpu_used(now).max(sample.cpu)
     }
 
     #[expect(clippy::cast_precision_loss, reason = "metres and per cent for plots")]

@@ -61,9 +61,9 @@ table! {
 table! {
     /// What components may use.
     pub(crate) struct CapacityTable {
-        /// Memory; default: what the machine has, less the reserve.
+        /// Memory, used by our processes; default: the machine's less the reserve, used by all.
         memory: Option<At<Bytes>>,
-        /// CPU, 100% is one core; default: all cores.
+        /// CPU, 100% is one core, used by our processes; default: all cores, used by all.
         cpu: Option<At<Permille>>,
         /// Kept for the system itself; default 150MB.
         reserve_memory: Option<At<Bytes>>,
