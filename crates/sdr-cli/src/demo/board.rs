@@ -9,7 +9,7 @@ use crate::{
     render::{
         progress::{Frame, Progress},
         status::is_active,
-        units::{level, megabytes, shorten},
+        units::{NOTHING, level, megabytes, shorten},
     },
     report::extra::Bars,
 };
@@ -115,6 +115,18 @@ impl Board {
         self.progress.show(&session.output, frame, &format!("of ~{ABOUT_S} s"))
     }
 
+    /// The last screen in its place: on a terminal below what was done, else alone.
+    pub(super) fn end(&mut self, session: &Session, lines: &[String]) -> Result<(), Failure> {
+        let mut all = Vec::new();
+        if self.redraw {
+            let took = self.started.elapsed().as_secs_f64();
+            all.push(format!("{:<69} {took:6.1} s", "sdr demo"));
+            all.extend(self.steps());
+        }
+        all.extend_from_slice(lines);
+        self.progress.replace(&session.output, &all)
+    }
+
     /// Everything, numbers included.
     fn drawn(&self, watch: &Watch) -> Frame {
         let mut lines = self.steps();
@@ -185,7 +197,10 @@ impl Board {
             let coordinator =
                 watch.any().is_some_and(|status| status.coordinator.as_deref() == Some(robot));
             let star = if coordinator { '*' } else { ' ' };
-            let low = view.rssi_dbm.is_some_and(|level| level <= self.bars.recovery_rssi_dbm);
+            let low = view
+                .rssi_dbm
+                .zip(self.bars.recovery_rssi_dbm)
+                .is_some_and(|(level, bar)| level <= bar);
             let here = watch.any().and_then(|status| status.systems.first());
             let here = here.into_iter().flat_map(|system| &system.components);
             let here = here.filter(|component| component.home.as_deref() == Some(robot));
@@ -198,7 +213,7 @@ impl Board {
             let line = format!(
                 " {robot:<8}{star}{:>14}{:>9}{:>7} {}  {}",
                 megabytes(view.memory_free_bytes),
-                megabytes(self.bars.allocation_memory_bytes),
+                self.bars.allocation_memory_bytes.map_or_else(|| NOTHING.to_owned(), megabytes),
                 level(view.rssi_dbm),
                 if low { '!' } else { ' ' },
                 names.join("  ")
@@ -227,9 +242,11 @@ mod tests {
     fn board() -> Board {
         let session = Session { agent: None, output: Output::new(Format::Text) };
         let bars = Bars {
-            allocation_memory_bytes: 500_000_000,
-            recovery_memory_bytes: 200_000_000,
-            recovery_rssi_dbm: -52.5,
+            allocation_memory_bytes: Some(500_000_000),
+            relaxed_memory_bytes: Some(250_000_000),
+            recovery_memory_bytes: Some(200_000_000),
+            recovery_rssi_dbm: Some(-52.5),
+            recovery_rssi_hold_s: Some(6.0),
         };
         Board::new(&session, bars)
     }

@@ -1,12 +1,16 @@
 //! The paper's system, built in, with what this run adds to it.
 
-use std::path::Path;
+use std::{fmt::Display, path::Path};
 
-use sdr_core::spec::{ComponentProfile, SystemSpec, Value};
+use sdr_core::{
+    recover::Cause,
+    spec::{ComponentProfile, SystemSpec, Value},
+};
 use sdr_files::{LoadedSystem, link_profiles, parse_system};
+use sdr_recovery::{Level, Trigger};
 use serde::Deserialize;
 
-use crate::failure::Failure;
+use crate::{failure::Failure, report::extra::Bars};
 
 /// The same text as the repository's file; its policies are built into the file reader.
 const TEXT: &str = include_str!("../../../../systems/exploration.yaml");
@@ -54,6 +58,32 @@ pub(super) fn make(
 pub(super) fn executables(folder: &Path) -> Result<Vec<String>, Failure> {
     let components = load(folder)?.spec.components;
     Ok(components.iter().map(|component| component.launch.name().to_owned()).collect())
+}
+
+/// The bars of its policies.
+pub(super) fn bars(folder: &Path) -> Result<Bars, Failure> {
+    let spec = load(folder)?.spec;
+    let unread = |error: &dyn Display| Failure::new(format!("{FILE}: {error}"));
+    let allocation = sdr_alloc::Policy::decode(&spec.allocation).map_err(|error| unread(&error))?;
+    let recovery = sdr_recovery::Policy::decode(&spec.recovery).map_err(|error| unread(&error))?;
+    let memory = |bars: &sdr_alloc::Bars| bars.memory_free_at_least.map(|bytes| bytes.0);
+    let mut bars = Bars {
+        allocation_memory_bytes: memory(&allocation.strict),
+        relaxed_memory_bytes: allocation.relaxed.as_ref().and_then(memory),
+        ..Bars::default()
+    };
+    for rule in &recovery.parts().rules {
+        let Trigger::Condition(condition) = rule.trigger else { continue };
+        let level = condition.bar.level();
+        if let (Cause::MemoryShort, Level::Memory(bytes)) = (rule.cause, level) {
+            bars.recovery_memory_bytes = Some(bytes.0);
+        }
+        if let (Cause::RssiLow, Level::Signal(level)) = (rule.cause, level) {
+            bars.recovery_rssi_dbm = Some(level.as_f64());
+            bars.recovery_rssi_hold_s = Some(condition.hold.as_secs_f64());
+        }
+    }
+    Ok(bars)
 }
 
 fn load(folder: &Path) -> Result<LoadedSystem, Failure> {
@@ -144,6 +174,27 @@ mod tests {
         }
         assert_eq!(with.allocation.name, "exploration");
         assert_eq!(with.connections[0].message_type, "sdr_msgs/msg/Ofimage");
+    }
+
+    #[test]
+    fn bars_are_those_of_the_policies_that_are_deployed() {
+        let folder = tempfile::tempdir().unwrap();
+        let built_in = Bars {
+            allocation_memory_bytes: Some(500_000_000),
+            relaxed_memory_bytes: Some(250_000_000),
+            recovery_memory_bytes: Some(200_000_000),
+            recovery_rssi_dbm: Some(-52.5),
+            recovery_rssi_hold_s: Some(6.0),
+        };
+        assert_eq!(bars(folder.path()).unwrap(), built_in);
+
+        let own = folder.path().join("policies/recovery");
+        std::fs::create_dir_all(&own).unwrap();
+        let text = include_str!("../../../../policies/recovery/exploration.yaml");
+        let edited = text.replace("-52.5dBm, for: 6s", "-60dBm, for: 9s");
+        std::fs::write(own.join("exploration.yaml"), edited).unwrap();
+        let found = bars(folder.path()).unwrap();
+        assert_eq!((found.recovery_rssi_dbm, found.recovery_rssi_hold_s), (Some(-60.0), Some(9.0)));
     }
 
     #[test]

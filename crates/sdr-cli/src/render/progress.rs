@@ -49,6 +49,21 @@ impl Progress {
         }
     }
 
+    /// Takes what was drawn off the terminal and puts `lines` there; without a terminal they follow
+    /// what was said before.
+    pub(crate) fn replace(&mut self, output: &Output, lines: &[String]) -> Result<(), Failure> {
+        let text = self.replacement(lines);
+        output.progress(&text)
+    }
+
+    fn replacement(&mut self, lines: &[String]) -> String {
+        let back = match std::mem::take(&mut self.drawn) {
+            0 => String::new(),
+            drawn => format!("\x1b[{drawn}A\r\x1b[J"),
+        };
+        format!("{back}{}\n", lines.join("\n"))
+    }
+
     /// The frame over the one before; what exceeds the screen is left out and counted.
     fn drawing(&mut self, frame: Frame, time: &str, (columns, rows): (usize, usize)) -> String {
         let width = columns.saturating_sub(1);
@@ -113,5 +128,7 @@ mod tests {
         let second = progress.drawing(frame(&["x"]), "1.1 s of 9", (40, 10));
         assert!(second.starts_with("\x1b[8A\r\x1b[Jhead"), "{second:?}");
         assert_eq!(progress.drawn, 2);
+        assert_eq!(progress.replacement(&["end".to_owned()]), "\x1b[2A\r\x1b[Jend\n");
+        assert_eq!(progress.replacement(&["more".to_owned()]), "more\n");
     }
 }

@@ -61,15 +61,20 @@ pub(crate) struct Radio {
     pub(crate) carrier: String,
 }
 
-/// The bars of Tables V and VI.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// The bars of Tables V and VI, as the deployed policies have them; `None` where they have none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct Bars {
     /// Table V: free memory that allocation wants to be left.
-    pub(crate) allocation_memory_bytes: u64,
+    pub(crate) allocation_memory_bytes: Option<u64>,
+    /// The same in recovery, when the first has no answer.
+    pub(crate) relaxed_memory_bytes: Option<u64>,
     /// Table VI: free memory at which recovery moves.
-    pub(crate) recovery_memory_bytes: u64,
+    pub(crate) recovery_memory_bytes: Option<u64>,
     /// Table VI: level at which recovery moves, dBm.
-    pub(crate) recovery_rssi_dbm: f64,
+    pub(crate) recovery_rssi_dbm: Option<f64>,
+    /// How long the level must hold, seconds.
+    pub(crate) recovery_rssi_hold_s: Option<f64>,
 }
 
 /// Who held the coordinator role.

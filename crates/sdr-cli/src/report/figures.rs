@@ -16,6 +16,27 @@ const AFTER_NS: u64 = 1_500_000_000;
 /// Truth and estimate further apart in time are not compared.
 const TRUTH_WITHIN_NS: u64 = 200_000_000;
 
+/// What became of a connection's samples; `sent` is `received`, `lost` and `unheard` together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Traffic {
+    /// By its output.
+    pub(crate) sent: Option<u64>,
+    /// At its consumers.
+    pub(crate) counts: Counts,
+    /// Sent while no consumer listened or took them.
+    pub(crate) unheard: Option<u64>,
+}
+
+impl Traffic {
+    /// Producer and consumer are read at different moments: what a consumer knows of was sent,
+    /// though the producer's counter may not say so yet.
+    fn new(sent: Option<u64>, counts: Counts) -> Self {
+        let known = counts.received + counts.lost;
+        let sent = sent.map(|sent| sent.max(known));
+        Self { sent, counts, unheard: sent.map(|sent| sent - known) }
+    }
+}
+
 /// See the module. `None` is unknown.
 #[derive(Debug, Default)]
 pub(crate) struct Figures {
@@ -43,8 +64,8 @@ pub(crate) struct Figures {
     pub(crate) placement_after: BTreeMap<String, String>,
     /// Epochs at the end.
     pub(crate) epochs: BTreeMap<String, u64>,
-    /// Samples by connection; `sent` is that of its output.
-    pub(crate) samples: BTreeMap<String, (Option<u64>, Counts)>,
+    /// Samples by connection.
+    pub(crate) samples: BTreeMap<String, Traffic>,
     /// Mean and largest distance between estimate and truth, metres.
     pub(crate) position_error_m: Option<(f64, f64)>,
 }
@@ -62,7 +83,8 @@ impl Figures {
         figures.find_placements(run);
         for (name, link) in &run.links {
             let output = name.split(" -> ").next().unwrap_or(name);
-            figures.samples.insert(name.clone(), (run.sent.get(output).copied(), link.counts()));
+            let traffic = Traffic::new(run.sent.get(output).copied(), link.counts());
+            figures.samples.insert(name.clone(), traffic);
         }
         figures.position_error_m = position_error(fixes, extra);
         figures
@@ -248,6 +270,17 @@ mod tests {
         assert_eq!((pause.gap_max_ns, pause.period_median_ns), (140, Some(20)));
         assert_eq!(command_pause(&times, 50, 900).unwrap().gap_max_ns, 660);
         assert_eq!(command_pause(&[5], 0, 10), None);
+    }
+
+    #[test]
+    fn samples_add_up_whichever_counter_was_read_last() {
+        let counts = Counts { received: 368, lost: 2, ..Counts::default() };
+        for sent in [0, 367, 370, 379] {
+            let traffic = Traffic::new(Some(sent), counts);
+            assert_eq!(traffic.sent, Some(370 + traffic.unheard.unwrap()));
+        }
+        assert_eq!(Traffic::new(Some(379), counts).unheard, Some(9));
+        assert_eq!(Traffic::new(None, counts).unheard, None);
     }
 
     #[test]

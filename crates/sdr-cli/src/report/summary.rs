@@ -61,6 +61,7 @@ pub(crate) struct Samples {
     pub(crate) sent: Option<u64>,
     pub(crate) received: u64,
     pub(crate) lost: u64,
+    pub(crate) unheard: Option<u64>,
     pub(crate) fenced: u64,
     pub(crate) late: u64,
 }
@@ -87,9 +88,11 @@ impl Summary {
             gap_max_ms: ms(pause.gap_max_ns),
             period_median_ms: pause.period_median_ns.map(ms),
         };
-        let samples = figures.samples.iter().map(|(name, (sent, counts))| {
+        let samples = figures.samples.iter().map(|(name, traffic)| {
+            let counts = &traffic.counts;
             let samples = Samples {
-                sent: *sent,
+                sent: traffic.sent,
+                unheard: traffic.unheard,
                 received: counts.received,
                 lost: counts.lost,
                 fenced: counts.fenced,

@@ -1,6 +1,6 @@
 //! A report from recordings written as an agent writes them.
 
-mod story;
+pub(crate) mod story;
 
 use super::*;
 use story::{MS, Story};
@@ -23,7 +23,9 @@ fn the_contract_fields_are_there_and_hold_what_was_recorded() {
     assert_eq!(json["epochs"]["camera"], 1);
     let samples = &json["samples"]["anomaly.danger -> controller.danger"];
     assert_eq!((&samples["received"], &samples["lost"]), (&270.into(), &1.into()));
-    assert_eq!(json["samples"]["fisheye.image -> anomaly.image"]["sent"], 400);
+    let samples = &json["samples"]["fisheye.image -> anomaly.image"];
+    assert_eq!((&samples["sent"], &samples["received"]), (&400.into(), &200.into()));
+    assert_eq!((&samples["lost"], &samples["unheard"]), (&0.into(), &200.into()));
     let gap = &json["stream_gap_ms"]["fisheye.image -> anomaly.image"];
     assert_eq!((&gap["gap_max_ms"], &gap["period_median_ms"]), (&105.0.into(), &66.0.into()));
     assert_eq!(json["controller_gap_ms"]["max"], 24.0);

@@ -31,6 +31,7 @@ use crate::{
     failure::Failure,
     locate,
     output::Format,
+    render::units::{NOTHING, megabytes},
     report::{
         Report,
         extra::{self, Bars, Coordinator, Extra},
@@ -42,12 +43,8 @@ use crate::{
 const RECEIVER: &str = "robot-1";
 /// Who is watched while the radio of the receiver fades.
 const WITNESS: &str = "robot-2";
-/// Table V and Table VI.
-const BARS: Bars = Bars {
-    allocation_memory_bytes: 500_000_000,
-    recovery_memory_bytes: 200_000_000,
-    recovery_rssi_dbm: -52.5,
-};
+/// No policy lies in a folder that is not there: the built-in ones are taken.
+const NO_POLICIES: &str = "empty";
 /// What leaves the fading robot.
 const MOVED: [&str; 2] = ["fisheye", "anomaly"];
 
@@ -61,13 +58,14 @@ pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Fai
     let stage = Stage::start(&world)?;
     let bodies = stage.bodies(&world);
     let fleet = Fleet::start(folder.path(), &bodies, plan.coordinator.as_deref())?;
-    let board = Board::new(session, BARS);
+    let bars = system::bars(&folder.path().join(NO_POLICIES))?;
+    let board = Board::new(session, bars);
     let mut watch = Watch::default();
     if let Some(images) = &plan.images {
         watch.say("cameras", &images.sentence());
     }
     let coordinator = Coordinator::default();
-    let mut story = Story { fleet, stage, folder, board, watch, plan, session, coordinator };
+    let mut story = Story { fleet, stage, folder, board, bars, watch, plan, session, coordinator };
     story.meet().await?;
     let spec = story.deploy().await?;
     story.drive().await?;
@@ -93,6 +91,7 @@ struct Story<'a> {
     stage: Stage,
     folder: Folder,
     board: Board,
+    bars: Bars,
     watch: Watch,
     plan: &'a Plan,
     session: &'a Session,
@@ -128,8 +127,7 @@ impl Story<'_> {
     async fn deploy(&mut self) -> Result<SystemSpec, Failure> {
         let client = &self.fleet.agent(RECEIVER).client;
         let available: Available = client.get("/v1/components").await?;
-        // No policy lies in a folder that is not there: the built-in ones are taken.
-        let empty = self.folder.path().join("empty");
+        let empty = self.folder.path().join(NO_POLICIES);
         let (ballast, images) =
             (self.plan.ballast, self.plan.images.as_ref().map(|one| one.path.as_path()));
         let spec = system::make(&available.components, &empty, ballast, images)?;
@@ -191,9 +189,13 @@ impl Story<'_> {
         let radio = Stage::radio();
         let text = format!("radio fades: {:.1} -> {:.1} dBm", radio.from_dbm, radio.to_dbm);
         self.watch.say(FADING, &text);
+        let size = |bytes: Option<u64>| bytes.map_or_else(|| NOTHING.to_owned(), megabytes);
+        let hold = self.bars.recovery_rssi_hold_s.unwrap_or(0.0);
+        let (first, relaxed) =
+            (size(self.bars.allocation_memory_bytes), size(self.bars.relaxed_memory_bytes));
         self.board.wait_for(&[
-            format!("rssi-low on {FADING} to hold for 6 s, then fisheye and anomaly"),
-            "move to where more than recovery's 200 MB stay free; allocation wants 500 MB".into(),
+            format!("rssi-low on {FADING} to hold for {hold} s, then fisheye and anomaly"),
+            format!("move to where {relaxed} stay free (relaxed bar); allocation wants {first}"),
         ]);
         self.wait(Duration::from_secs(60), |story| {
             let text = story.fading();
@@ -246,7 +248,7 @@ impl Story<'_> {
         if self.plan.keep {
             lines.extend(ending::kept(self.fleet.agent(RECEIVER).socket()));
         }
-        self.session.output.progress(&(lines.join("\n") + "\n"))?;
+        self.board.end(self.session, &lines)?;
         Ok(report)
     }
 
@@ -255,7 +257,7 @@ impl Story<'_> {
             ballast: Some(self.plan.ballast),
             machine: Some(Machine::here()),
             radio: Some(Stage::radio()),
-            bars: Some(BARS),
+            bars: Some(self.bars),
             coordinator: self.coordinator.clone(),
             components: spec.components.iter().map(|one| one.name.to_string()).collect(),
             connections: spec.connections.iter().map(|one| one.label()).collect(),
@@ -288,8 +290,8 @@ impl Story<'_> {
             let part = |ms: u64| Duration::from_millis(ms).as_secs_f64();
             format!(", held {:.1} of {:.1} s", part(one.held_ms), part(one.hold_ms))
         });
-        let bar = BARS.recovery_rssi_dbm;
-        format!("{FADING} at {level}, bar {bar:.1} dBm{}", held.unwrap_or_default())
+        let bar = crate::render::units::level(self.bars.recovery_rssi_dbm);
+        format!("{FADING} at {level}, bar {bar} dBm{}", held.unwrap_or_default())
     }
 }
 

@@ -37,12 +37,13 @@ fn memory(report: &Report, metrics: &[RobotMetrics]) -> Panel {
         .iter()
         .map(|one| (report.run.second(one.monotonic_ns), megabytes(one.memory_free_bytes)));
     let bars = report.extra.bars.iter().flat_map(|bars| {
-        [("Table V", bars.allocation_memory_bytes), ("Table VI", bars.recovery_memory_bytes)].map(
-            |(table, bytes)| Bar {
-                at: megabytes(bytes),
-                label: format!("{table}: {} MB", bytes / 1_000_000),
-            },
-        )
+        let known =
+            [("Table V", bars.allocation_memory_bytes), ("Table VI", bars.recovery_memory_bytes)];
+        known.into_iter().filter_map(|(table, bytes)| {
+            let bytes = bytes?;
+            let label = format!("{table}: {} MB", bytes / 1_000_000);
+            Some(Bar { at: megabytes(bytes), label })
+        })
     });
     Panel::Line(LinePanel {
         title: "Free memory".to_owned(),
@@ -56,9 +57,9 @@ fn memory(report: &Report, metrics: &[RobotMetrics]) -> Panel {
 fn radio(report: &Report, metrics: &[RobotMetrics]) -> Panel {
     let points =
         metrics.iter().map(|one| (report.run.second(one.monotonic_ns), f64::from(one.rssi_dbm)));
-    let bars = report.extra.bars.iter().map(|bars| Bar {
-        at: bars.recovery_rssi_dbm,
-        label: format!("Table VI: {:.1} dBm", bars.recovery_rssi_dbm),
+    let bars = report.extra.bars.iter().filter_map(|bars| {
+        let at = bars.recovery_rssi_dbm?;
+        Some(Bar { at, label: format!("Table VI: {at:.1} dBm") })
     });
     Panel::Line(LinePanel {
         title: "RSSI".to_owned(),

@@ -2,8 +2,8 @@
 
 use super::{CAVEAT, PAPER_ACTIVATION_S, PAPER_RECOVERY_S, duration, or_dash, section, table};
 use crate::{
-    render::units::count,
-    report::{Report, svg::escape},
+    render::units::{count, megabytes},
+    report::{Report, extra::Bars, svg::escape},
 };
 
 /// This run's figures beside the paper's.
@@ -65,8 +65,8 @@ fn durations(report: &Report) -> Vec<[String; 4]> {
 fn behaviour(report: &Report) -> Vec<[String; 4]> {
     let figures = &report.figures;
     let usual = figures.commands.and_then(|pause| pause.period_median_ns);
-    let lost: u64 = figures.samples.values().map(|(_, counts)| counts.lost).sum();
-    let received: u64 = figures.samples.values().map(|(_, counts)| counts.received).sum();
+    let lost: u64 = figures.samples.values().map(|one| one.counts.lost).sum();
+    let received: u64 = figures.samples.values().map(|one| one.counts.received).sum();
     let row =
         |name: &str, here: String, what: String| [name.to_owned(), here, "-".to_owned(), what];
     let mut rows = vec![
@@ -82,7 +82,7 @@ fn behaviour(report: &Report) -> Vec<[String; 4]> {
             "samples lost",
             lost.to_string(),
             format!(
-                "missing in the sequence of any connection, of {} in the whole run",
+                "missing in the sequence after a consumer's first sample, of {} on all connections",
                 received + lost
             ),
         ),
@@ -154,21 +154,8 @@ pub(super) fn environment(report: &Report) -> String {
         add(name, capacity);
     }
     if let Some(bars) = &report.extra.bars {
-        add(
-            "Table V, allocation",
-            Some(format!(
-                "free memory after placing at least {} MB",
-                bars.allocation_memory_bytes / 1_000_000
-            )),
-        );
-        add(
-            "Table VI, recovery",
-            Some(format!(
-                "free memory {} MB or less; RSSI {:.1} dBm or less for 6 s",
-                bars.recovery_memory_bytes / 1_000_000,
-                bars.recovery_rssi_dbm
-            )),
-        );
+        add("Table V, allocation", allocation_bars(bars));
+        add("Table VI, recovery", recovery_bars(bars));
     }
     let body = if rows.is_empty() {
         "<p class=\"muted\">The recordings do not say.</p>\n".to_owned()
@@ -178,20 +165,45 @@ pub(super) fn environment(report: &Report) -> String {
     section("Table IV of this run", &body)
 }
 
+/// What allocation wants to be left.
+fn allocation_bars(bars: &Bars) -> Option<String> {
+    let first = bars.allocation_memory_bytes?;
+    let words = format!("free memory after placing at least {}", megabytes(first));
+    Some(match bars.relaxed_memory_bytes {
+        Some(relaxed) => format!("{words}; in recovery at least {}", megabytes(relaxed)),
+        None => words,
+    })
+}
+
+/// What recovery acts on.
+fn recovery_bars(bars: &Bars) -> Option<String> {
+    let memory = bars.recovery_memory_bytes;
+    let memory = memory.map(|bytes| format!("free memory {} or less", megabytes(bytes)));
+    let radio = bars.recovery_rssi_dbm.map(|level| {
+        let hold = bars.recovery_rssi_hold_s.map(|hold| format!(" for {hold} s"));
+        format!("RSSI {level:.1} dBm or less{}", hold.unwrap_or_default())
+    });
+    let words: Vec<String> = memory.into_iter().chain(radio).collect();
+    (!words.is_empty()).then(|| words.join("; "))
+}
+
 /// One row for each connection.
 pub(super) fn connections(report: &Report) -> String {
     let figures = &report.figures;
     let rows: Vec<Vec<String>> = figures
         .samples
         .iter()
-        .map(|(name, (sent, counts))| {
+        .map(|(name, traffic)| {
+            let counts = &traffic.counts;
+            let known = |number: Option<u64>| or_dash(number.map(|number| number.to_string()));
             let period = report.run.links.get(name).and_then(|link| link.period_ns());
             let pause = figures.pauses.get(name).copied().flatten();
             vec![
                 name.clone(),
-                or_dash(sent.map(|sent| sent.to_string())),
+                known(traffic.sent),
                 counts.received.to_string(),
                 counts.lost.to_string(),
+                known(traffic.unheard),
                 counts.fenced.to_string(),
                 counts.late.to_string(),
                 or_dash(period.map(duration)),
@@ -204,15 +216,18 @@ pub(super) fn connections(report: &Report) -> String {
         ">sent",
         ">received",
         ">lost",
+        ">unheard",
         ">fenced",
         ">late",
         ">median period",
         ">longest pause at the move",
     ];
     let note = "<p class=\"muted\">Sent counts from an output's first sample, also while nobody \
-        listens yet, and over both homes while they overlap. Lost: missing in the sequence. \
-        Fenced: of an old home, refused. Counters are read five times a second, so the last \
-        samples of an instance may be missing in them.</p>\n";
+        listens yet, and over both homes while they overlap; it is received, lost and unheard \
+        together. Lost: missing in the sequence after a consumer's first sample. Unheard: sent \
+        before a consumer's first sample or after its last, refused ones of an old home (fenced) \
+        included. Counters are read five times a second, producer and consumer not at once, so \
+        the last samples of an instance may be missing in them.</p>\n";
     section("Connections", &format!("{}{note}", table(&head, &rows)))
 }
 

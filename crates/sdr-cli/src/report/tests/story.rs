@@ -20,7 +20,7 @@ use crate::report::{
     machine::Machine,
 };
 
-pub(super) const MS: u64 = 1_000_000;
+pub(crate) const MS: u64 = 1_000_000;
 /// Log times are monotonic times and this.
 const WALL_NS: u64 = 1_700_000_000_000_000_000;
 const SYSTEM: &str = "exploration";
@@ -28,7 +28,7 @@ const ROBOTS: [&str; 3] = ["robot-1", "robot-2", "robot-3"];
 
 /// Messages by robot, in any order.
 #[derive(Default)]
-pub(super) struct Story {
+pub(crate) struct Story {
     messages: BTreeMap<&'static str, Vec<Message>>,
 }
 
@@ -41,7 +41,7 @@ struct Message {
 }
 
 /// What a demo would know of it.
-pub(super) fn extra() -> Extra {
+pub(crate) fn extra() -> Extra {
     let truth = (0..600).map(|tick: u32| TruthPoint {
         monotonic_ns: u64::from(tick) * 50 * MS,
         x_m: 1.5 + f64::from(tick) * 0.015,
@@ -63,9 +63,11 @@ pub(super) fn extra() -> Extra {
             carrier: "loopback".to_owned(),
         }),
         bars: Some(Bars {
-            allocation_memory_bytes: 500_000_000,
-            recovery_memory_bytes: 200_000_000,
-            recovery_rssi_dbm: -52.5,
+            allocation_memory_bytes: Some(500_000_000),
+            relaxed_memory_bytes: Some(250_000_000),
+            recovery_memory_bytes: Some(200_000_000),
+            recovery_rssi_dbm: Some(-52.5),
+            recovery_rssi_hold_s: Some(6.0),
         }),
         coordinator: Coordinator::default(),
         components: names(&["fisheye", "anomaly", "camera", "controller", "position"]),
@@ -91,7 +93,7 @@ pub(super) fn extra() -> Extra {
 
 impl Story {
     /// Robots without any system.
-    pub(super) fn bare() -> Self {
+    pub(crate) fn bare() -> Self {
         let mut story = Self::default();
         for robot in ROBOTS {
             let metrics = RobotMetrics { rssi_dbm: f32::NAN, ..metrics(robot, 1000, 1900) };
@@ -101,7 +103,7 @@ impl Story {
     }
 
     /// Deployed at 1 s, active at 1.9 s, in trouble from 21 s, moved by 21.4 s.
-    pub(super) fn whole() -> Self {
+    pub(crate) fn whole() -> Self {
         let mut story = Self::default();
         for (index, robot) in ROBOTS.into_iter().enumerate() {
             for tick in 0..130 {
@@ -124,7 +126,7 @@ impl Story {
     }
 
     /// Writes `<robot>.mcap` for each robot.
-    pub(super) fn write(mut self, folder: &Path) -> Vec<PathBuf> {
+    pub(crate) fn write(mut self, folder: &Path) -> Vec<PathBuf> {
         let mut files = Vec::new();
         for (robot, messages) in &mut self.messages {
             messages.sort_by_key(|message| message.at_ns);
