@@ -235,9 +235,9 @@ mod tests {
 
     #[test]
     fn half_a_unit_is_gone_on_with_rather_than_changed() {
-        let meant = |error: UnitError| match error {
-            UnitError::UnknownUnit { meant, .. } => meant,
-            other => panic!("{other}"),
+        let meant = |error: UnitError| {
+            let UnitError::UnknownUnit { meant, .. } = error else { panic!("{error}") };
+            meant
         };
         assert_eq!(meant(size("530M").unwrap_err()), Some("MB"));
         assert_eq!(meant(size("1g").unwrap_err()), Some("GB"));

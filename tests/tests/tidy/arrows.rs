@@ -18,7 +18,7 @@ fn may_know(name: &str) -> &'static [&'static str] {
         "sdr-alloc" | "sdr-recovery" | "sdr-component" | "sdr-lab" => &["sdr-core"],
         "sdr-files" => &["sdr-core", "sdr-alloc", "sdr-recovery"],
         "sdr-agent" => &["sdr-core", "sdr-alloc", "sdr-recovery", "sdr-files", "sdr-component"],
-        "sdr-cli" => &["sdr-core", "sdr-files", "sdr-lab"],
+        "sdr-cli" => &["sdr-core", "sdr-alloc", "sdr-recovery", "sdr-files", "sdr-lab"],
         "sdr-components" => &["sdr-core", "sdr-component", "sdr-lab"],
         stranger => {
             panic!("{stranger} is new: say here whom it may know, and why in docs/decisions")

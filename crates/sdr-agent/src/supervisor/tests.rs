@@ -138,7 +138,10 @@ impl Bench {
             match self.news(instance).await {
                 InstanceNews::Hung { reason } => return reason,
                 news @ InstanceNews::Exited { .. } => panic!("{news:?}"),
-                _ => {}
+                InstanceNews::Started { .. }
+                | InstanceNews::LaunchFailed { .. }
+                | InstanceNews::State { .. }
+                | InstanceNews::Heard { .. } => {}
             }
         }
     }
