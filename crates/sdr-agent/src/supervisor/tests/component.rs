@@ -4,7 +4,6 @@ use std::env;
 use std::io::{Read as _, Write as _};
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
-use std::time::Duration;
 
 use sdr_component::protocol::{
     Beat, Counters, ENV_COMPONENT, ENV_INSTANCE, ENV_ORPHAN_MS, ENV_SOCKET, FromComponent, Hello,
@@ -82,7 +81,9 @@ impl Body {
                 self.say(&FromComponent::State(report(LifecycleState::Inactive, None)));
                 if self.manner == "gone" {
                     self.stream.shutdown(Shutdown::Both).unwrap();
-                    std::thread::sleep(Duration::from_secs(1000));
+                    loop {
+                        std::thread::park();
+                    }
                 }
             }
             ToComponent::Command(Order::Activate { .. }) if self.manner == "stubborn" => {}
