@@ -28,6 +28,8 @@ const TOLD: [&str; 18] = [
     "hung",
     "error",
     "restart",
+    "move-foreseen",
+    "move-called-off",
     "move-started",
     "move-failed",
     "moved",

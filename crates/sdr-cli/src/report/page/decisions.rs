@@ -23,6 +23,8 @@ const RECOVERY: [&str; 22] = [
     "plan-failed",
     "placed",
     "homeless",
+    "move-foreseen",
+    "move-called-off",
     "move-started",
     "move-prepared",
     "move-failed",
