@@ -124,6 +124,23 @@ pub struct ConditionReport {
     pub foreseen: bool,
 }
 
+/// What the holder of the coordinator role says of those who may follow it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SuccessionReport {
+    /// The term it speaks of.
+    pub term: u64,
+    /// Who takes over when it is silent, the first first; they hear its beats directly.
+    pub order: Vec<RobotId>,
+    /// Period of those beats.
+    pub beat: Duration,
+    /// Beats that may be missed on a good link.
+    pub misses: u32,
+    /// Who should take the role now.
+    pub offered_to: Option<RobotId>,
+    /// Why it is offered.
+    pub reason: String,
+}
+
 /// Everything an author may say, one record each.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Report {
@@ -139,4 +156,6 @@ pub enum Report {
     Condition(ConditionReport),
     /// The coordinator found no home for a component.
     Homeless(Homeless),
+    /// The coordinator's successors.
+    Succession(SuccessionReport),
 }

@@ -7,7 +7,7 @@ use std::{
 };
 
 use sdr_core::{
-    api::{DeployAnswer, StatusView},
+    api::{Accepted, DeployAnswer, StatusView},
     brain::{Brain, BrainConfig, Seams},
     effect::{Command, Direction, Effect, LaunchOrder, Route, StoredState},
     event::Event,
@@ -328,7 +328,12 @@ impl Robot {
                     let result = sdr_alloc::allocate(&problem);
                     self.later(now + SOON, Input::Planned { plan, result });
                 }
-                Effect::Answer { result, .. } => self.answers.push(result),
+                Effect::Answer { result, .. } => {
+                    self.answers.push(result.map(|accepted| match accepted {
+                        Accepted::System(answer) => answer,
+                        Accepted::Role(answer) => panic!("an answer about the role: {answer:?}"),
+                    }))
+                }
                 Effect::Event(event) => self.events.push((now, event)),
             }
         }

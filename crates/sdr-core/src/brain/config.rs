@@ -3,7 +3,9 @@
 use alloc::{boxed::Box, string::String, vec::Vec};
 use core::{fmt, net::SocketAddr, time::Duration};
 
-use crate::{id::RobotId, recover::Recovery, report::RobotFacts, spec::PolicyBytes};
+use crate::{
+    fitness::RolePolicy, id::RobotId, recover::Recovery, report::RobotFacts, spec::PolicyBytes,
+};
 
 /// Who the robot is and how patient it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +31,8 @@ pub struct BrainConfig {
     pub rejoin_wait: Duration,
     /// How long an old home may go on in a planned move; default 1 s.
     pub drain_max: Duration,
+    /// How the holder of the coordinator role is chosen, until the fleet has a policy of its own.
+    pub role_policy: RolePolicy,
     /// How long the target of a move may take to get ready; default 30 s.
     pub prepare_max: Duration,
 }
@@ -47,6 +51,7 @@ impl BrainConfig {
             gone_after: Duration::from_secs(10),
             rejoin_wait: Duration::from_secs(2),
             drain_max: Duration::from_secs(1),
+            role_policy: RolePolicy::default(),
             prepare_max: Duration::from_secs(30),
         }
     }

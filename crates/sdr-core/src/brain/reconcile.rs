@@ -1,6 +1,6 @@
 //! Every robot's part: what should be here against what is.
 
-use alloc::{collections::BTreeSet, format, vec::Vec};
+use alloc::format;
 
 use super::{Brain, instances::Told};
 use crate::{
@@ -29,10 +29,7 @@ pub(super) enum Duty {
 impl Brain {
     pub(super) fn reconcile(&mut self, now: Instant) {
         self.update_readiness(now);
-        let wanted = self.systems.values().flat_map(|system| system.keys().collect::<Vec<_>>());
-        let running = self.instances.values().map(|instance| instance.component.clone());
-        let keys: BTreeSet<ComponentKey> = wanted.chain(running).collect();
-        for key in keys {
+        for key in self.mine() {
             match self.duty(&key) {
                 Duty::None => self.leave(&key),
                 Duty::Home(epoch) => self.be_home(now, &key, &epoch),
