@@ -267,6 +267,7 @@ impl Brain {
                     self.event("robot-alive", text);
                     self.plans.retry_soon();
                 }
+                MeshNews::Quiet(_) | MeshNews::Isolated | MeshNews::Rejoined => {}
                 MeshNews::Gone(robot) => self.note_gone(now, &robot),
                 MeshNews::DuplicateId(from) => {
                     if self.duplicates_told.len() < 16 && self.duplicates_told.insert(from) {
