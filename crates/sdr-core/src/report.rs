@@ -72,8 +72,13 @@ pub struct LinkReport {
     pub rtt: Duration,
     /// Mean change from one round trip to the next (RFC 3550, section 6.4.1).
     pub jitter: Duration,
-    /// Lost datagrams of the last 64, thousandths.
+    /// Lost of the last 64 datagrams there or back, thousandths: what a question with its
+    /// answer suffers.
     pub loss: Permille,
+    /// Lost of the last 64 datagrams to the other robot, as it counts them.
+    pub loss_out: Permille,
+    /// Lost of the last 64 datagrams from the other robot.
+    pub loss_in: Permille,
 }
 
 /// What an instance does on its robot.

@@ -22,9 +22,9 @@ pub struct BrainConfig {
     pub listen: Option<SocketAddr>,
     /// From the operating system's randomness: incarnation nonce and seed.
     pub seed: u64,
-    /// Time between two rounds of gossip; default 250 ms.
+    /// Time between two rounds of gossip; default 350 ms.
     pub gossip_period: Duration,
-    /// Age of the last fresh news at which a robot counts as gone; default 10 s.
+    /// Age of the last fresh news at which a robot counts as gone; default 11.5 s.
     pub gone_after: Duration,
     /// How long after the start to wait for a peer before activating what is remembered;
     /// default 2 s.
@@ -47,8 +47,8 @@ impl BrainConfig {
             seeds: Vec::new(),
             listen: None,
             seed: 0,
-            gossip_period: Duration::from_millis(250),
-            gone_after: Duration::from_secs(10),
+            gossip_period: Duration::from_millis(350),
+            gone_after: Duration::from_millis(11_500),
             rejoin_wait: Duration::from_secs(2),
             drain_max: Duration::from_secs(1),
             role_policy: RolePolicy::default(),

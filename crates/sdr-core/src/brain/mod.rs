@@ -357,6 +357,7 @@ impl Brain {
                     self.plans.retry_soon();
                     self.stir = Stir::ALL;
                 }
+                MeshNews::Quiet(_) | MeshNews::Isolated | MeshNews::Rejoined => {}
                 MeshNews::Gone(robot) => self.note_gone(now, &robot),
                 MeshNews::DuplicateId(from) => {
                     if self.duplicates_told.len() < 16 && self.duplicates_told.insert(from) {
