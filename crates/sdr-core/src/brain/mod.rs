@@ -227,6 +227,11 @@ impl Brain {
         self.status_view(now)
     }
 
+    /// What this robot knows of the fleet, to look at.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
     /// Counters of the mesh, for metrics.
     pub fn mesh_counters(&self) -> crate::mesh::MeshCounters {
         self.mesh.counters()
