@@ -1,9 +1,15 @@
 //! `sdr sim`: the very brains of the agents in virtual time.
 
-use std::{process::ExitCode, time::Duration};
+use std::{
+    ops::Range,
+    panic::resume_unwind,
+    process::ExitCode,
+    sync::atomic::{AtomicU64, Ordering},
+    time::Duration,
+};
 
 use clap::Subcommand;
-use sdr_lab::sim::{Figures, Plain, Rate, Record, Spread};
+use sdr_lab::sim::{Figures, Plain, Rate, Record, Scenario, Spread, Telling, fair_weather, shrink};
 
 use crate::{Session, failure::Failure, output::Format};
 
@@ -18,6 +24,8 @@ pub(crate) struct SimArgs {
 enum SimCommand {
     /// Run fleets in virtual time and print what was measured
     Run(RunArgs),
+    /// Run one drawn seed again and tell what happened; with --shrink, the shortest story
+    Replay(ReplayArgs),
 }
 
 /// Arguments of `sdr sim run`.
@@ -44,6 +52,13 @@ struct RunArgs {
     /// Kill no robots: detection, gaps and joins are not measured
     #[arg(long)]
     no_kills: bool,
+    /// The seed draws everything: fleet, radio, faults, operators; only --seed, --seeds and
+    /// --jobs count
+    #[arg(long)]
+    chaos: bool,
+    /// Seeds run at the same time
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    jobs: u16,
     /// Draws what is left to chance
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -52,18 +67,40 @@ struct RunArgs {
     seeds: u64,
 }
 
+/// Arguments of `sdr sim replay`.
+#[derive(Debug, clap::Args)]
+struct ReplayArgs {
+    /// The seed that drew the run
+    #[arg(long)]
+    seed: u64,
+    /// Only these incidents, by number
+    #[arg(long, value_delimiter = ',', value_name = "NUMBERS")]
+    only: Option<Vec<usize>>,
+    /// A fair radio and perfect clocks instead of the drawn ones
+    #[arg(long)]
+    fair: bool,
+    /// Leave out what the broken rule does not need, and tell the shortest story
+    #[arg(long)]
+    shrink: bool,
+}
+
 /// Runs and prints; exit code 1 when a rule was broken.
 pub(crate) fn run(args: SimArgs, session: &Session) -> Result<ExitCode, Failure> {
     match args.command {
         SimCommand::Run(args) => figures(&args, session),
+        SimCommand::Replay(args) => replay(&args, session),
     }
 }
 
 fn figures(args: &RunArgs, session: &Session) -> Result<ExitCode, Failure> {
     let plain = plain(args)?;
+    let seeds = args.seed..args.seed.saturating_add(args.seeds.max(1));
     let mut record = Record::default();
-    for seed in args.seed..args.seed.saturating_add(args.seeds.max(1)) {
-        record.add(Plain { seed, ..plain.clone() }.run());
+    for one in each(seeds, usize::from(args.jobs), |seed| match args.chaos {
+        true => Scenario::draw(seed).run(Telling::Silent).record,
+        false => Plain { seed, ..plain.clone() }.run(),
+    }) {
+        record.add(one);
     }
     let figures = record.figures();
     match session.output.format() {
@@ -72,11 +109,85 @@ fn figures(args: &RunArgs, session: &Session) -> Result<ExitCode, Failure> {
             for line in lines(&figures) {
                 session.output.line(&line)?;
             }
+            if args.chaos {
+                for violation in &figures.violations {
+                    let again = format!("sdr sim replay --seed {} --shrink", violation.seed);
+                    session.output.line(&format!("to see why: {again}"))?;
+                }
+            }
         }
     }
     match figures.violations.is_empty() {
         true => Ok(ExitCode::SUCCESS),
         false => Ok(ExitCode::FAILURE),
+    }
+}
+
+/// Runs `seeds`, `jobs` at a time; results in the order of the seeds.
+fn each(seeds: Range<u64>, jobs: usize, run: impl Fn(u64) -> Record + Sync) -> Vec<Record> {
+    let next = AtomicU64::new(seeds.start);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            if seed >= seeds.end {
+                return done;
+            }
+            done.push((seed, run(seed)));
+        }
+    };
+    let mut all: Vec<(u64, Record)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..jobs).map(|_| scope.spawn(work)).collect();
+        let joined = workers.into_iter().map(|worker| worker.join());
+        joined.flat_map(|done| done.unwrap_or_else(|panic| resume_unwind(panic))).collect()
+    });
+    all.sort_by_key(|(seed, _)| *seed);
+    all.into_iter().map(|(_, record)| record).collect()
+}
+
+/// The same run again, told line by line.
+fn replay(args: &ReplayArgs, session: &Session) -> Result<ExitCode, Failure> {
+    let mut scenario = Scenario::draw(args.seed);
+    let mut line = format!("sdr sim replay --seed {}", args.seed);
+    if let Some(numbers) = &args.only {
+        scenario = scenario.only(numbers);
+    }
+    if args.fair {
+        scenario = fair_weather(&scenario);
+    }
+    let mut outcome = scenario.run(Telling::Whole);
+    if let (true, Some(violation)) = (args.shrink, outcome.violation()) {
+        let shrunk = shrink(&scenario, &violation.rule);
+        let numbers: Vec<String> = shrunk.numbers.iter().map(ToString::to_string).collect();
+        line.push_str(&format!(" --only {}", numbers.join(",")));
+        if shrunk.fair || args.fair {
+            line.push_str(" --fair");
+        }
+        scenario = shrunk.scenario;
+        outcome = scenario.run(Telling::Whole);
+    }
+    match session.output.format() {
+        Format::Json => session.output.json(&outcome.record.figures())?,
+        Format::Text => {
+            session.output.line(&format!("{} robots, {:?}", scenario.robots, scenario.weather))?;
+            for (index, incident) in scenario.incidents.iter().enumerate() {
+                let after = incident.after.as_secs_f64();
+                session.output.line(&format!("{:3} {after:8.3} {}", index + 1, incident.fault))?;
+            }
+            for line in &outcome.story {
+                session.output.line(line)?;
+            }
+            for line in lines(&outcome.record.figures()) {
+                session.output.line(&line)?;
+            }
+            if args.shrink && outcome.violation().is_some() {
+                session.output.line(&format!("the same again: {line}"))?;
+            }
+        }
+    }
+    match outcome.violation() {
+        None => Ok(ExitCode::SUCCESS),
+        Some(_) => Ok(ExitCode::FAILURE),
     }
 }
 

@@ -126,6 +126,12 @@ impl Air {
         self.deaf[robot] = Some((since, until));
     }
 
+    pub(crate) fn hear(&mut self, robot: usize, now: Instant) {
+        if let Some((_, until)) = &mut self.deaf[robot] {
+            *until = now.min(*until);
+        }
+    }
+
     pub(crate) fn deaf_since(&self, robot: usize, now: Instant) -> Option<Instant> {
         self.deaf[robot].filter(|(_, until)| now < *until).map(|(since, _)| since)
     }

@@ -82,6 +82,9 @@ impl Fleet {
 
     /// A fault strikes now.
     pub fn strike(&mut self, fault: &Fault) {
+        if self.setup.keeps_events {
+            self.struck.push((self.now, fault.to_string()));
+        }
         match fault {
             Fault::Crash { robot, down, disk } => self.crash(*robot, *down, *disk),
             Fault::CrashAtStore { robot, down } => {
@@ -158,6 +161,7 @@ impl Fleet {
         if disk == DiskFate::Lost {
             self.robots[robot].disk.wipe();
         }
+        self.robots[robot].is_lost = down.is_none();
         if let Some(down) = down {
             self.queue.push(self.now + down, Due::Start { robot });
         }
@@ -181,10 +185,32 @@ impl Fleet {
         self.queue.push(self.now + time, Due::Over(Over::Cut(self.cuts)));
     }
 
-    /// All walls fall, all radios hear, all disks work: the end of the faults.
+    /// All walls fall, all radios hear, all disks work, all robots that should are on: the
+    /// end of the faults.
     pub fn calm(&mut self) {
+        let now = self.now;
         self.air.cuts.clear();
+        self.air.weather = Weather { loss: 0.0, burst_loss: 0.0, ..self.air.weather.clone() };
+        for robot in &mut self.robots {
+            robot.disk.full = false;
+            robot.disk.time = super::disk::STORE_TIME;
+            robot.behaviours.clear();
+            robot.crash_at_store = None;
+            robot.paused_until = now;
+        }
+        for robot in 0..self.robots.len() {
+            self.air.hear(robot, now);
+            self.robots[robot].host.rssi = self.level_of(robot);
+            self.flow_at(robot);
+            if !self.robots[robot].is_on() && !self.robots[robot].is_lost {
+                self.switch_on(robot);
+            }
+        }
+        self.steady_since = now;
         self.sights.push(Sight::Calm);
+        if self.setup.keeps_events {
+            self.struck.push((now, "faults are over".into()));
+        }
     }
 
     fn over_at(&mut self, at: Instant, over: Over) {

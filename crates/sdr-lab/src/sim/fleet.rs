@@ -150,6 +150,8 @@ pub struct Fleet {
     pub(crate) steady_since: Instant,
     /// What brains said, when it is kept: when, who, what.
     pub told: Vec<(Instant, usize, Event)>,
+    /// Faults that struck, in words, when they are kept.
+    pub struck: Vec<(Instant, String)>,
     steps: u64,
 }
 
@@ -185,6 +187,7 @@ impl Fleet {
             cuts: 0,
             steady_since: BEGIN,
             told: Vec::new(),
+            struck: Vec::new(),
             steps: 0,
             setup,
         }
@@ -258,6 +261,14 @@ impl Fleet {
     /// How the fleet was set up.
     pub fn setup(&self) -> &Setup {
         &self.setup
+    }
+
+    /// Where the robots stand, metres from the middle; empty when places do not matter.
+    pub fn place(&mut self, places: Vec<(f64, f64)>) {
+        self.air.place(places);
+        for robot in 0..self.robots.len() {
+            self.robots[robot].host.rssi = self.level_of(robot);
+        }
     }
 
     /// Whether what a robot stores is kept for its next start.

@@ -171,7 +171,13 @@ fn markers(run: &mut Run, chance: &mut Chance, time: Duration) {
             systems::fitting(1000, 1, run.fleet.setup().memory, sdr_core::units::Permille(1));
         let system = systems::chain(systems::name("marker", number), 1, needs);
         let begun = run.fleet.now;
-        let receiver = chance.below(run.fleet.robots.len());
+        let mut receiver = chance.below(run.fleet.robots.len());
+        for _ in 0..run.fleet.robots.len() {
+            if !run.fleet.was_deaf_since(receiver, begun) {
+                break;
+            }
+            receiver = (receiver + 1) % run.fleet.robots.len();
+        }
         run.fleet.deploy(receiver, &system);
         let mut lacking: Vec<usize> = (0..run.fleet.robots.len()).collect();
         let known = run.advance_until(BETWEEN_MARKERS, Duration::from_millis(5), |fleet| {
@@ -186,7 +192,10 @@ fn markers(run: &mut Run, chance: &mut Chance, time: Duration) {
             lacking.len() * 100 <= fleet.robots.len()
         });
         let took = run.fleet.now.since(begun);
-        run.measure.record.known99_ms.push(took.as_secs_f64() * 1000.0);
+        // a receiver that fell deaf told nobody
+        if !run.fleet.was_deaf_since(receiver, begun) {
+            run.measure.record.known99_ms.push(took.as_secs_f64() * 1000.0);
+        }
         if known {
             run.advance(BETWEEN_MARKERS.saturating_sub(took));
         }

@@ -55,6 +55,8 @@ pub struct Robot {
     pub(crate) backlog: usize,
     /// Loses power in the middle of its next write, for so long.
     pub(crate) crash_at_store: Option<Duration>,
+    /// It does not come back.
+    pub(crate) is_lost: bool,
     /// Most effects of one `handle` so far.
     pub(crate) effects_max: usize,
     /// Longest datagram so far.
@@ -83,6 +85,7 @@ impl Robot {
             paused_until: Instant::ZERO,
             backlog: 0,
             crash_at_store: None,
+            is_lost: false,
             effects_max: 0,
             datagram_bytes_max: 0,
         }

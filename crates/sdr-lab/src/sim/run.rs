@@ -11,6 +11,8 @@ pub(crate) struct Run {
     pub(crate) fleet: Fleet,
     pub(crate) watch: Watch,
     pub(crate) measure: Measure,
+    /// Stops at the first rule that is broken.
+    pub(crate) stops_early: bool,
     look_at: Instant,
     look_period: Duration,
     real: RealInstant,
@@ -30,6 +32,7 @@ impl Run {
             look_period,
             counted_at: fleet.now,
             fleet,
+            stops_early: false,
             watch: Watch::new(seed),
             measure: Measure::default(),
             real: RealInstant::now(),
@@ -46,15 +49,23 @@ impl Run {
                 if self.fleet.has_sights() {
                     self.show();
                 }
+                if self.is_over() {
+                    return;
+                }
             }
             if self.fleet.now >= self.look_at {
                 self.look_at = self.fleet.now + self.look_period;
                 self.look();
             }
-            if self.fleet.now >= end {
+            if self.fleet.now >= end || self.is_over() {
                 return;
             }
         }
+    }
+
+    /// Whether it stops here because a rule is broken.
+    pub(crate) fn is_over(&self) -> bool {
+        self.stops_early && !self.watch.violations.is_empty()
     }
 
     /// Lets time pass until `done`; false when `limit` passed first.
@@ -66,7 +77,7 @@ impl Run {
     ) -> bool {
         let end = self.fleet.now + limit;
         while !done(&self.fleet) {
-            if self.fleet.now >= end {
+            if self.fleet.now >= end || self.is_over() {
                 return false;
             }
             self.advance(pace);

@@ -78,3 +78,8 @@ pub fn patient() -> PolicyBytes {
     parts.rules.retain(|rule| !of_links(rule.cause));
     sdr_recovery::Policy::new(parts).expect("fewer rules are still a policy").encode()
 }
+
+/// The name of a component of a drawn system: one in the whole fleet.
+pub(crate) fn component_name(system: usize, component: usize) -> String {
+    format!("s{system}c{component}")
+}

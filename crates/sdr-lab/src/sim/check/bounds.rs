@@ -8,9 +8,10 @@ use crate::sim::{Broken, Checker, Fleet, Sight};
 const EFFECTS_MAX: usize = 4096;
 /// Bytes of one datagram.
 const DATAGRAM_MAX: usize = 1200;
-/// Bytes that one robot sends in a second, on average between two looks: a tenth of a
-/// poor radio's 10 Mbit/s for each of few robots.
+/// Bytes that one robot sends in a second, on average over [`RATE_OVER`].
 const SENT_BYTES_S_MAX: f64 = 400_000.0;
+/// Bursts shorter than this are no growth.
+const RATE_OVER: f64 = 5.0;
 /// Processes of one robot for each component that ever was.
 const PROCESSES_EACH_MAX: usize = 2;
 
@@ -26,14 +27,17 @@ impl Checker for Bounds {
         if !matches!(sight, Sight::Look) {
             return None;
         }
-        let passed = self.looked_at.map(|at| fleet.now.since(at).as_secs_f64());
-        self.looked_at = Some(fleet.now);
-        let before = std::mem::replace(&mut self.sent, fleet.tally.sent_bytes.clone());
+        let passed = self.looked_at.map_or(0.0, |at| fleet.now.since(at).as_secs_f64());
+        let before = self.sent.clone();
+        if self.looked_at.is_none() || passed >= RATE_OVER {
+            self.looked_at = Some(fleet.now);
+            self.sent.clone_from(&fleet.tally.sent_bytes);
+        }
         let processes_max = fleet.components() * PROCESSES_EACH_MAX;
         fleet.robots.iter().enumerate().find_map(|(number, robot)| {
-            let sent = self.sent[number] - before.get(number).copied().unwrap_or(0);
-            let rate =
-                passed.filter(|passed| *passed >= 0.4).map_or(0.0, |passed| sent as f64 / passed);
+            let sent =
+                before.get(number).map_or(0, |before| fleet.tally.sent_bytes[number] - before);
+            let rate = if passed >= RATE_OVER { sent as f64 / passed } else { 0.0 };
             let processes = robot.processes().count();
             let what = if robot.effects_max() > EFFECTS_MAX {
                 format!("{}: {} effects of one input", robot.id, robot.effects_max())
