@@ -78,6 +78,7 @@ pub(crate) struct Cut {
     pub(crate) inside: Vec<bool>,
     pub(crate) way: Way,
     pub(crate) since: Instant,
+    pub(crate) until: Instant,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -134,6 +135,12 @@ impl Air {
 
     pub(crate) fn deaf_since(&self, robot: usize, now: Instant) -> Option<Instant> {
         self.deaf[robot].filter(|(_, until)| now < *until).map(|(since, _)| since)
+    }
+
+    /// How long the present deafness of a robot lasts in all.
+    pub(crate) fn deaf_for(&self, robot: usize, now: Instant) -> Option<Duration> {
+        let (since, until) = self.deaf[robot].filter(|(_, until)| now < *until)?;
+        Some(until.since(since))
     }
 
     pub(crate) fn was_deaf_since(&self, robot: usize, since: Instant) -> bool {
@@ -241,7 +248,13 @@ mod tests {
     fn a_cut_one_way_lets_the_other_way_through() {
         let mut air = air(Weather::fair());
         let inside = vec![true, false, false, false];
-        air.cuts.push(Cut { id: 1, inside, way: Way::Out, since: Instant::ZERO });
+        air.cuts.push(Cut {
+            id: 1,
+            inside,
+            way: Way::Out,
+            since: Instant::ZERO,
+            until: Instant::from_millis(1),
+        });
 
         let now = Instant::ZERO;
         assert!(!air.is_linked(0, 1, now) && air.is_linked(1, 0, now) && air.is_linked(1, 2, now));

@@ -171,6 +171,9 @@ impl Fleet {
         let until = self.now + time;
         let now = self.now;
         let paused = &mut self.robots[robot];
+        if now >= paused.paused_until {
+            paused.paused_at = now;
+        }
         paused.paused_until = paused.paused_until.max(until);
         if clock == ClockFate::Sleeps {
             paused.clock.sleep(now, time);
@@ -181,8 +184,9 @@ impl Fleet {
     fn cut(&mut self, robots: &[usize], way: Way, time: Duration) {
         self.cuts += 1;
         let inside = (0..self.robots.len()).map(|robot| robots.contains(&robot)).collect();
-        self.air.cuts.push(Cut { id: self.cuts, inside, way, since: self.now });
-        self.queue.push(self.now + time, Due::Over(Over::Cut(self.cuts)));
+        let until = self.now + time;
+        self.air.cuts.push(Cut { id: self.cuts, inside, way, since: self.now, until });
+        self.queue.push(until, Due::Over(Over::Cut(self.cuts)));
     }
 
     /// All walls fall, all radios hear, all disks work, all robots that should are on: the

@@ -172,8 +172,9 @@ impl Measure {
     }
 }
 
-/// Whether a judgement "gone" was wrong: the robot was up during the whole silence, and both
-/// could reach each other by some path at some moment of it.
+/// Whether a judgement "gone" was wrong: the robot was up for at least as long as silence must
+/// last, and whatever kept the two apart (deafness, a cut, an agent that stands still), if
+/// anything did, is shorter than that from its beginning to its end.
 fn is_false(fleet: &Fleet, observer: usize, target: usize) -> bool {
     let robot = &fleet.robots[target];
     let up = robot.is_on() && fleet.now.since(robot.on_since()) >= GONE_AFTER;

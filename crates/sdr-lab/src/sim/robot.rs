@@ -50,6 +50,7 @@ pub struct Robot {
     pub(crate) outs: BTreeMap<String, Option<Token>>,
     pub(crate) ins: BTreeMap<String, ()>,
     pub(crate) wake_at: Option<Instant>,
+    pub(crate) paused_at: Instant,
     pub(crate) paused_until: Instant,
     /// Datagrams in the socket's buffer while the loop stands still.
     pub(crate) backlog: usize,
@@ -82,6 +83,7 @@ impl Robot {
             outs: BTreeMap::new(),
             ins: BTreeMap::new(),
             wake_at: None,
+            paused_at: Instant::ZERO,
             paused_until: Instant::ZERO,
             backlog: 0,
             crash_at_store: None,

@@ -47,12 +47,17 @@ impl Fleet {
         !self.air.cuts.is_empty()
     }
 
-    /// How long two robots have not been able to reach each other; `None` when they can.
+    /// How long the present separation of two robots lasts in all, from its beginning to its
+    /// end: deafness, cuts, agents that stand still. `None` when nothing is between them.
     pub fn apart_for(&self, a: usize, b: usize) -> Option<Duration> {
-        let deaf = [a, b].into_iter().filter_map(|robot| self.air.deaf_since(robot, self.now));
-        let cut = self.air.cuts.iter().filter(|cut| cut.inside[a] != cut.inside[b]);
-        let since = deaf.chain(cut.map(|cut| cut.since)).min()?;
-        Some(self.now.since(since))
+        let deaf = [a, b].into_iter().filter_map(|robot| self.air.deaf_for(robot, self.now));
+        let cuts = self.air.cuts.iter().filter(|cut| cut.inside[a] != cut.inside[b]);
+        let cuts = cuts.map(|cut| cut.until.since(cut.since));
+        let paused = [a, b].into_iter().map(|robot| &self.robots[robot]);
+        let paused = paused
+            .filter(|robot| self.now < robot.paused_until)
+            .map(|robot| robot.paused_until.since(robot.paused_at));
+        deaf.chain(cuts).chain(paused).max()
     }
 
     /// Whether a robot's radio was deaf at any time since then.
