@@ -48,6 +48,7 @@ use crate::{
     input::{Input, InstanceId},
     mesh::{FleetTable, Incarnation, Mesh, MeshConfig, MeshNews},
     order::hash64,
+    planted::{self, Defect},
     recover::{Cause, Fault},
     report::{ConditionReport, HostReport},
     time::{Duration, Instant},
@@ -129,7 +130,8 @@ impl Brain {
         };
         let fleet = FleetTable::from_stored(stored.fleet);
         let mesh = Mesh::new(mesh_config, own, fleet, &stored.peers, now);
-        let runs = stored.runs.into_iter().map(|(key, run)| (key, RunBook::from_disk(run)));
+        let runs = stored.runs.into_iter().filter(|_| !planted::is(Defect::RunNotReserved));
+        let runs = runs.map(|(key, run)| (key, RunBook::from_disk(run)));
         let mut brain = Box::new(Self {
             me: config.robot.clone(),
             config,
@@ -270,6 +272,11 @@ impl Brain {
                 MeshNews::Alive(robot) => {
                     let text = alloc::format!("{robot} is heard");
                     self.event("robot-alive", text);
+                    if planted::is(Defect::RestartedByHeal) {
+                        let ids: alloc::vec::Vec<InstanceId> =
+                            self.instances.keys().copied().collect();
+                        ids.into_iter().for_each(|id| self.finish(id));
+                    }
                     self.plans.retry_soon();
                 }
                 MeshNews::Gone(robot) => self.note_gone(now, &robot),

@@ -8,6 +8,7 @@ use crate::{
     id::RobotId,
     mesh::FleetRecord,
     order::Version,
+    planted::{self, Defect},
     record::{FleetValue, RecordKind, RoleRecord},
     report::RolePreference,
     time::Instant,
@@ -40,9 +41,10 @@ impl Brain {
             None => true,
             Some(holder) if *holder == self.me => return,
             Some(holder) if self.mesh.is_alive(holder) => self.gives_way(holder),
-            Some(_) => self.has_witness(),
+            Some(_) => self.has_witness() && !planted::is(Defect::RoleNeverTaken),
         };
-        if !free || self.fittest().as_ref() != Some(&self.me) {
+        let fittest = self.fittest().as_ref() == Some(&self.me);
+        if !free || !(fittest || planted::is(Defect::RoleTakenByAll)) {
             return;
         }
         let term = self.term() + 1;

@@ -8,6 +8,7 @@ use super::wire::FleetBucket;
 use crate::{
     effect::StoredRecord,
     order::{Version, hash64},
+    planted::{self, Defect},
     record::{FleetKey, FleetValue, RECORD_BYTES_MAX, RecordKind},
 };
 
@@ -98,7 +99,11 @@ impl FleetTable {
         }
         match self.records.get(&record.key) {
             Some((known, _)) if *known == record => return Merge::Known,
-            Some((known, _)) if known.rank() > record.rank() => return Merge::Older,
+            Some((known, _))
+                if known.rank() > record.rank() && !planted::is(Defect::NoVersionOrder) =>
+            {
+                return Merge::Older;
+            }
             None if self.records.len() >= RECORDS_MAX => return Merge::Refused,
             Some(_) | None => {}
         }
@@ -113,6 +118,11 @@ impl FleetTable {
             | FleetValue::Unknown => None,
         };
         self.records.insert(record.key.clone(), (record, value));
+        if planted::is(Defect::TombstoneDropped) {
+            self.records.retain(
+                |_, (_, value)| !matches!(value, FleetValue::System(system) if !system.wanted),
+            );
+        }
         if let Some((name, revision)) = system {
             self.drop_parts_before(&name, revision);
         }

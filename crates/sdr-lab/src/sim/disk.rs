@@ -79,10 +79,6 @@ impl Disk {
     pub(crate) fn held(&self) -> Option<&StoredState> {
         self.held.as_ref()
     }
-
-    pub(crate) fn hold(&mut self, state: StoredState) {
-        self.held = Some(state);
-    }
 }
 
 /// What a crash leaves of the write under way; a file is replaced as a whole.

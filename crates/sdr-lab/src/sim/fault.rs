@@ -29,8 +29,10 @@ pub enum ClockFate {
     Sleeps,
 }
 
-/// One fault, or one deed of an operator.
+/// One fault, or one deed of an operator. Robots are numbers from 0; its sentence names them
+/// from 1, as the robots call themselves.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "the doc of each fault says what its fields are")]
 pub enum Fault {
     /// Power fails, and comes back after `down`, if ever.
     Crash { robot: usize, down: Option<Duration>, disk: DiskFate },
@@ -223,11 +225,23 @@ impl Fleet {
     }
 
     fn turn_all(&mut self, word: &str, turn: &Turn) {
-        for robot in 0..self.robots.len() {
-            for instance in self.robots[robot].instances_of(word) {
-                self.turn(robot, instance, turn.clone());
-            }
+        (0..self.robots.len()).for_each(|robot| self.turn_at(robot, word, turn));
+    }
+
+    fn turn_at(&mut self, robot: usize, word: &str, turn: &Turn) {
+        for instance in self.robots[robot].instances_of(word) {
+            self.turn(robot, instance, turn.clone());
         }
+    }
+
+    /// The processes of a component on a robot end by themselves.
+    pub fn kill(&mut self, robot: usize, word: &str) {
+        self.turn_at(robot, word, &Turn::Exit("killed by signal 9"));
+    }
+
+    /// The processes of a component on a robot stop answering.
+    pub fn hang(&mut self, robot: usize, word: &str) {
+        self.turn_at(robot, word, &Turn::Hang);
     }
 
     /// The level a robot measures when nothing fades.

@@ -238,6 +238,11 @@ impl Fleet {
         self.steps
     }
 
+    /// How many things are due: datagrams under way, timers, outcomes.
+    pub fn due(&self) -> usize {
+        self.queue.len()
+    }
+
     /// Time since the beginning.
     pub fn age(&self) -> Duration {
         self.now.since(BEGIN)

@@ -6,6 +6,10 @@ use sdr_core::time::Instant;
 
 use super::{Broken, Fleet, Record, Sight, Watch, measure::Measure};
 
+/// A look after so many steps at the latest: a fleet that floods itself gets no further in
+/// time.
+const LOOK_STEPS: u64 = 50_000;
+
 /// A fleet under watch.
 pub(crate) struct Run {
     pub(crate) fleet: Fleet,
@@ -15,6 +19,7 @@ pub(crate) struct Run {
     pub(crate) stops_early: bool,
     look_at: Instant,
     look_period: Duration,
+    looked_after: u64,
     real: RealInstant,
     on_s: f64,
     counted_at: Instant,
@@ -30,6 +35,7 @@ impl Run {
         Self {
             look_at: fleet.now + look_period,
             look_period,
+            looked_after: 0,
             counted_at: fleet.now,
             fleet,
             stops_early: false,
@@ -48,6 +54,9 @@ impl Run {
             while self.fleet.step(until) {
                 if self.fleet.has_sights() {
                     self.show();
+                }
+                if self.fleet.steps() >= self.looked_after + LOOK_STEPS {
+                    self.look();
                 }
                 if self.is_over() {
                     return;
@@ -110,6 +119,7 @@ impl Run {
     }
 
     fn look(&mut self) {
+        self.looked_after = self.fleet.steps();
         self.count_hours();
         self.watch.show(&self.fleet, &Sight::Look);
         self.measure.see(&self.fleet, &Sight::Look);

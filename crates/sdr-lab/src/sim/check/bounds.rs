@@ -15,6 +15,9 @@ const RATE_OVER: f64 = 5.0;
 /// Processes of one robot for each component that ever was.
 const PROCESSES_EACH_MAX: usize = 2;
 
+/// Things due for each robot: datagrams under way, timers, outcomes.
+const DUE_EACH_MAX: usize = 2000;
+
 /// `unbounded`.
 #[derive(Debug, Default)]
 pub struct Bounds {
@@ -32,6 +35,10 @@ impl Checker for Bounds {
         if self.looked_at.is_none() || passed >= RATE_OVER {
             self.looked_at = Some(fleet.now);
             self.sent.clone_from(&fleet.tally.sent_bytes);
+        }
+        if fleet.due() > fleet.robots.len().max(10) * DUE_EACH_MAX {
+            let what = format!("{} datagrams and timers are due", fleet.due());
+            return Some(Broken::new("unbounded", what));
         }
         let processes_max = fleet.components() * PROCESSES_EACH_MAX;
         fleet.robots.iter().enumerate().find_map(|(number, robot)| {
