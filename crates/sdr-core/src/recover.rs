@@ -195,6 +195,21 @@ pub struct CauseStatus {
     pub reason: String,
 }
 
+/// A cause that will send a component to another robot, should it hold for its whole time.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Foresight {
+    /// Which component.
+    pub component: ComponentKey,
+    /// What holds, not yet for long enough.
+    pub cause: Cause,
+    /// What will be tried first.
+    pub remedy: Remedy,
+    /// How long it must hold in all.
+    pub hold: Duration,
+    /// With numbers.
+    pub reason: String,
+}
+
 /// What came of a remedy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RemedyOutcome {
@@ -226,6 +241,10 @@ pub trait Recovery {
 
     /// Causes that hold now, raised or not yet.
     fn standing(&self) -> Vec<CauseStatus>;
+
+    /// Components that will have to leave this robot unless what holds now ends in time: so
+    /// that another robot can be made ready meanwhile.
+    fn foreseen(&self) -> Vec<Foresight>;
 
     /// Whether the policy says what to do about `cause` at all.
     fn has_rule(&self, cause: Cause) -> bool;

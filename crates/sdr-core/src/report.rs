@@ -119,6 +119,9 @@ pub struct ConditionReport {
     pub reason: String,
     /// Milliseconds since the cause had held for its whole time, when this was made.
     pub held_over_ms: u64,
+    /// Whether it is only foreseen: it holds, but not yet for its whole time. Others get
+    /// ready, and nothing moves.
+    pub foreseen: bool,
 }
 
 /// Everything an author may say, one record each.

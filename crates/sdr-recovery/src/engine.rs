@@ -6,7 +6,8 @@ use core::time::Duration;
 use sdr_core::{
     id::ComponentKey,
     recover::{
-        Cause, CauseStatus, Evidence, Fault, Recovery, RemedyOutcome, RobotEvidence, Verdict,
+        Cause, CauseStatus, Evidence, Fault, Foresight, Recovery, Remedy, RemedyOutcome,
+        RobotEvidence, Verdict,
     },
     spec::PolicyBytes,
     time::Instant,
@@ -151,6 +152,33 @@ impl Engine {
         Some(Trouble { rule, since, held_over_at, reason: condition_reason(seen, now) })
     }
 
+    /// Whether a condition that is not raised yet will send a component away, and how.
+    fn foresee(&self, component: &ComponentKey, watch: &Watch, index: usize) -> Option<Foresight> {
+        let parts = self.policy.parts();
+        let rule = &parts.rules[index];
+        let seen = sustain(&watch.own, &self.robot, index)?;
+        let Stage::Pending { since } = seen.stage() else { return None };
+        let remedy = match self.policy.ladder(rule, watch.actuator).rungs().first()? {
+            Rung::StandbyElsewhere => Remedy::StandbyElsewhere,
+            Rung::LaunchElsewhere => Remedy::LaunchElsewhere,
+            Rung::LocalStandby | Rung::Restart(_) | Rung::Hold => return None,
+        };
+        let hold = seen.condition().hold;
+        let wait = hold * parts.limits.prepare_after.0 / 1000;
+        let held = self.judged_at.since(since);
+        let moves = self.moves.get(component);
+        let may_move = moves.is_none_or(|moves| {
+            moves.clone().has_room(self.judged_at, parts.limits.moves_per_hour)
+        });
+        (held >= wait && wait < hold && may_move && watch.is_free_for(index)).then(|| Foresight {
+            component: component.clone(),
+            cause: rule.cause,
+            remedy,
+            hold,
+            reason: condition_reason(seen, self.judged_at),
+        })
+    }
+
     fn judge_one(&mut self, now: Instant, one: &Evidence, troubles: Vec<Trouble>) -> Vec<Verdict> {
         let Some(watch) = self.watches.get_mut(&one.component) else {
             return Vec::new();
@@ -245,6 +273,15 @@ impl Recovery for Engine {
             }
         }
         standing
+    }
+
+    fn foreseen(&self) -> Vec<Foresight> {
+        let mut foreseen = Vec::new();
+        for (component, watch) in &self.watches {
+            let of = |rule| self.foresee(component, watch, rule);
+            foreseen.extend((0..self.policy.parts().rules.len()).filter_map(of));
+        }
+        foreseen
     }
 
     fn has_rule(&self, cause: Cause) -> bool {

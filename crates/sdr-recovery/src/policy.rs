@@ -3,7 +3,7 @@
 use alloc::{string::String, vec::Vec};
 use core::time::Duration;
 
-use sdr_core::{recover::Cause, spec::PolicyBytes};
+use sdr_core::{recover::Cause, spec::PolicyBytes, units::Permille};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// First byte of an encoded policy; raised when fields change.
-pub const POLICY_VERSION: u8 = 1;
+pub const POLICY_VERSION: u8 = 2;
 
 /// Longest window over which samples are smoothed; it bounds what is kept.
 pub const MEDIAN_OVER_MAX: Duration = Duration::from_secs(60);
@@ -95,6 +95,9 @@ pub struct Limits {
     pub settle: Duration,
     /// Pause before a remedy that was refused is asked for again.
     pub retry: Backoff,
+    /// Share of a condition's hold time after which another robot gets ready for what would
+    /// leave; all of it: never before.
+    pub prepare_after: Permille,
 }
 
 /// Whether what moved away comes back by itself.
@@ -114,6 +117,7 @@ impl Default for Limits {
             not_back_for: Duration::from_secs(120),
             settle: Duration::from_secs(10),
             retry: Backoff { min: Duration::from_secs(1), max: Duration::from_secs(30) },
+            prepare_after: Permille(500),
         }
     }
 }
@@ -175,6 +179,9 @@ pub enum PolicyError {
         /// What was given.
         found_ms: u64,
     },
+    /// More than the whole hold time.
+    #[error("limits: prepare_after is {} %; at most 100 %", .0.0 / 10)]
+    PrepareAfter(Permille),
     /// The greatest pause is under the least.
     #[error("limits: the greatest pause of retry is under its least, or the least is zero")]
     Retry,
@@ -206,6 +213,10 @@ impl Policy {
         let retry = parts.limits.retry;
         if retry.min.is_zero() || retry.max < retry.min {
             return Err(PolicyError::Retry);
+        }
+        let share = parts.limits.prepare_after;
+        if share.0 > 1000 {
+            return Err(PolicyError::PrepareAfter(share));
         }
         Ok(Self(parts))
     }

@@ -156,6 +156,11 @@ impl Robot {
         }
     }
 
+    /// Processes that run on it.
+    pub fn process_count(&self) -> usize {
+        self.processes.len()
+    }
+
     pub(super) fn has_active(&self, component: &str) -> bool {
         self.processes.values().any(|process| {
             process.component.name.as_str() == component && process.state == LifecycleState::Active

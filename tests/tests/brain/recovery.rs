@@ -47,6 +47,42 @@ fn a_fading_radio_moves_both_components_together_to_the_relaxed_home() {
 }
 
 #[test]
+fn the_next_home_is_ready_when_the_time_of_a_condition_is_over() {
+    let mut fleet = deployed(21);
+    for robot in &mut fleet.robots {
+        let slow = Behaviour { initialise: Duration::from_secs(2), ..Behaviour::default() };
+        robot.behaviours.insert("fisheye".into(), slow);
+    }
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "moved", |fleet| fleet.events("moved").len() == 2);
+
+    let at = |kind| fleet.events(kind)[0].0;
+    let story = fleet.story();
+    assert!(at("move-foreseen") < at("condition-raised"), "{story}");
+    assert!(at("moved").since(at("condition-raised")) < Duration::from_secs(1), "{story}");
+    let anomaly = fleet.component("exploration", "anomaly").unwrap();
+    assert!(anomaly.reason.contains("held 6."), "{}", anomaly.reason);
+}
+
+#[test]
+fn what_was_foreseen_and_did_not_come_is_taken_back_without_a_move() {
+    let mut fleet = deployed(22);
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "foreseen", |fleet| fleet.events("move-foreseen").len() == 2);
+    fleet.run(Duration::from_millis(500));
+    fleet.set_rssi(0, -47.0);
+    fleet.run_until(LONG, "taken back", |fleet| fleet.events("move-called-off").len() == 2);
+    fleet.run(Duration::from_secs(30));
+
+    let story = fleet.story();
+    assert_eq!(fleet.events("condition-raised"), [], "{story}");
+    assert_eq!(fleet.home("exploration", "fisheye").as_deref(), Some("robot-1"), "{story}");
+    assert_eq!(fleet.component("exploration", "fisheye").unwrap().epoch, 1, "{story}");
+    assert_eq!(fleet.active_on("fisheye").len(), 1, "{story}");
+    assert_eq!(fleet.robots[2].process_count(), 1, "only position is left\n{story}");
+}
+
+#[test]
 fn the_old_home_goes_on_until_the_new_one_is_heard() {
     let mut fleet = deployed(2);
     fleet.set_rssi(0, -55.0);

@@ -15,7 +15,7 @@ pub(super) const LOOK_EVERY: Duration = Duration::from_millis(150);
 /// Events kept for the screen.
 const NEWS_MAX: usize = 64;
 /// Kinds that tell the story; the recordings hold all.
-const TOLD: [&str; 18] = [
+const TOLD: [&str; 20] = [
     "role-taken",
     "deployed",
     "placed",
@@ -28,6 +28,8 @@ const TOLD: [&str; 18] = [
     "hung",
     "error",
     "restart",
+    "move-foreseen",
+    "move-called-off",
     "move-started",
     "move-failed",
     "moved",

@@ -13,6 +13,10 @@ use crate::{
     time::{Duration, Instant},
 };
 
+/// What is foreseen is taken back so long after its cause was last seen, in shares of its
+/// hold time: a figure that jumps about its bar starts nothing twice.
+const LINGER: u32 = 1;
+
 /// A condition nobody could help with for so long counts as refused, so the ladder goes on.
 const HELP_WAIT: Duration = Duration::from_secs(5);
 
@@ -37,8 +41,14 @@ impl Brain {
             components: Vec::new(),
             remedy: verdict.remedy,
             reason: verdict.reason.clone(),
-            held_over_ms: u64::try_from(over.as_millis()).unwrap_or(u64::MAX),
+            held_over_ms: 0,
+            foreseen: true,
         });
+        if core::mem::take(&mut condition.foreseen) {
+            condition.components.clear();
+            condition.reason.clone_from(&verdict.reason);
+            condition.held_over_ms = u64::try_from(over.as_millis()).unwrap_or(u64::MAX);
+        }
         condition.remedy = verdict.remedy;
         let raised = format!("{}: {}", verdict.cause, verdict.reason);
         self.said.note_condition(&verdict.component, &raised, self.handled_at);
@@ -51,11 +61,38 @@ impl Brain {
         self.push_event(event.number("held_over_ns", nanos(verdict.held_over_at)));
     }
 
+    /// Publishes what will have to leave if nothing changes, so that its next home gets ready.
+    pub(super) fn foresee(&mut self, now: Instant, system: &Name) {
+        let Some(engine) = self.engines.get(system) else { return };
+        for seen in engine.recovery.foreseen() {
+            let place = (system.clone(), seen.cause);
+            let condition =
+                self.conditions.entry(place.clone()).or_insert_with(|| ConditionReport {
+                    system: system.clone(),
+                    cause: seen.cause,
+                    components: Vec::new(),
+                    remedy: seen.remedy,
+                    reason: seen.reason.clone(),
+                    held_over_ms: 0,
+                    foreseen: true,
+                });
+            if !condition.foreseen {
+                continue;
+            }
+            if !condition.components.contains(&seen.component.name) {
+                condition.components.push(seen.component.name.clone());
+            }
+            self.foreseen_until.insert(place, now + seen.hold * LINGER);
+        }
+        self.foreseen_until.retain(|_, until| now < *until);
+    }
+
     /// Takes conditions back whose components left, or whose cause is over; says the others.
     pub(super) fn clear_conditions(&mut self, now: Instant) {
         let standing: Vec<CauseStatus> =
             self.engines.values().flat_map(|engine| engine.recovery.standing()).collect();
         let mut conditions = core::mem::take(&mut self.conditions);
+        let foreseen = &self.foreseen_until;
         let mut over = Vec::new();
         for ((system, cause), condition) in &mut conditions {
             condition.components.retain(|name| {
@@ -64,20 +101,24 @@ impl Brain {
                 let active = self
                     .current(&key)
                     .is_some_and(|id| self.instances[&id].state == LifecycleState::Active);
-                here && match is_event(*cause) {
-                    true => !active,
-                    false => still_raised(&standing, &key, *cause),
+                here && match (condition.foreseen, is_event(*cause)) {
+                    (true, _) => foreseen.contains_key(&(system.clone(), *cause)),
+                    (false, true) => !active,
+                    (false, false) => still_raised(&standing, &key, *cause),
                 }
             });
             if condition.components.is_empty() {
-                over.push((system.clone(), *cause));
+                over.push(((system.clone(), *cause), condition.foreseen));
             }
         }
-        for place in over {
+        for (place, foreseen) in over {
             conditions.remove(&place);
+            self.foreseen_until.remove(&place);
             self.mesh.retract(&AuthorKey::condition(&place.0, place.1));
-            let text = format!("{} of {}", place.1, place.0);
-            self.event("condition-cleared", text);
+            if !foreseen {
+                let text = format!("{} of {}", place.1, place.0);
+                self.event("condition-cleared", text);
+            }
         }
         self.conditions = conditions;
         for condition in self.conditions.values() {

@@ -20,7 +20,7 @@ use crate::{
     event::Event,
     id::{Name, RobotId},
     input::PlanId,
-    recover::Remedy,
+    recover::{Cause, Remedy},
     report::{ConditionReport, Report},
     time::Instant,
 };
@@ -67,8 +67,11 @@ impl Brain {
                 })
             };
             let names: Vec<Name> = condition.components.iter().filter(leaves).cloned().collect();
-            let reason = condition.reason.clone();
-            let purpose = Purpose::Move { from, cause: condition.cause, reason };
+            let (cause, reason) = (condition.cause, condition.reason.clone());
+            let purpose = match condition.foreseen {
+                true => Purpose::Prepare { from, cause, reason },
+                false => Purpose::Move { from, cause, reason },
+            };
             if !names.is_empty() && self.ask(now, system, &names, purpose) {
                 return true;
             }
@@ -110,7 +113,9 @@ impl Brain {
         }
         let tier = match purpose {
             Purpose::Deploy => Tier::Strict,
-            Purpose::Move { .. } | Purpose::Rehome { .. } => Tier::Relaxed,
+            Purpose::Move { .. } | Purpose::Prepare { .. } | Purpose::Rehome { .. } => {
+                Tier::Relaxed
+            }
         };
         let avoid = self.avoid(now, system, names);
         let problem = self.problem(system, names, tier, &avoid);
@@ -189,7 +194,9 @@ impl Brain {
     }
 
     fn adopt(&mut self, now: Instant, asked: &Asked, plan: &Plan) {
-        for homeless in &plan.homeless {
+        let foreseen = matches!(asked.purpose, Purpose::Prepare { .. });
+        // nothing is missed yet of what is only foreseen, so nothing is said of it
+        for homeless in plan.homeless.iter().filter(|_| !foreseen) {
             let refusals: Vec<String> = homeless.refusals.iter().map(ToString::to_string).collect();
             if self.say_homeless(homeless) {
                 self.event_about("homeless", &homeless.component, refusals.join("; "));
@@ -208,15 +215,23 @@ impl Brain {
         match &asked.purpose {
             Purpose::Deploy | Purpose::Rehome { .. } => self.assign(asked, plan),
             Purpose::Move { .. } => self.begin_move(now, asked, plan),
+            Purpose::Prepare { .. } => self.prepare(now, asked, plan),
         }
     }
+}
+
+/// Why a component leaves; the rest of its reason stands behind it.
+pub(super) fn leaving_reason(from: &RobotId, cause: Cause, reason: &str) -> String {
+    format!("from {from}, {cause}: {reason}; ")
 }
 
 /// Why a component goes where it goes.
 pub(super) fn placed_reason(asked: &Asked, placement: &crate::allocate::Placement) -> String {
     let mut reason = match &asked.purpose {
         Purpose::Deploy => String::new(),
-        Purpose::Move { from, cause, reason } => format!("from {from}, {cause}: {reason}; "),
+        Purpose::Move { from, cause, reason } | Purpose::Prepare { from, cause, reason } => {
+            leaving_reason(from, *cause, reason)
+        }
         Purpose::Rehome { reason } => format!("{reason}; "),
     };
     if placement.refusals.is_empty() {

@@ -55,6 +55,7 @@ impl Brain {
             for verdict in engine.recovery.judge(now, &evidence) {
                 self.carry_out(now, &name, verdict);
             }
+            self.foresee(now, &name);
         }
         self.clear_conditions(now);
     }

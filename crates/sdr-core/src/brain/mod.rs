@@ -22,6 +22,7 @@ mod launch;
 mod minting;
 mod moves;
 mod plans;
+mod prepare;
 mod problem;
 mod reconcile;
 mod requests;
@@ -91,6 +92,8 @@ pub struct Brain {
     unreadable: BTreeMap<Name, crate::spec::PolicyBytes>,
     faults: BTreeMap<ComponentKey, Fault>,
     conditions: BTreeMap<(Name, Cause), ConditionReport>,
+    /// How long what is foreseen stays said.
+    foreseen_until: BTreeMap<(Name, Cause), Instant>,
     restarts: BTreeMap<ComponentKey, RestartPlan>,
     held: BTreeMap<ComponentKey, String>,
     /// Components that failed here and wait for their ladder's word.
@@ -152,6 +155,7 @@ impl Brain {
             unreadable: BTreeMap::new(),
             faults: BTreeMap::new(),
             conditions: BTreeMap::new(),
+            foreseen_until: BTreeMap::new(),
             restarts: BTreeMap::new(),
             held: BTreeMap::new(),
             failed: BTreeSet::new(),

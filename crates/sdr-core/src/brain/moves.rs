@@ -14,6 +14,7 @@ use super::{
     Brain,
     decide::placed_reason,
     plans::{Asked, Purpose},
+    prepare::Call,
 };
 use crate::{
     allocate::{Placement, Plan},
@@ -34,6 +35,14 @@ pub(super) struct MoveWatch {
     from: Option<RobotId>,
     /// Set once the new home is chosen: done when it is active and heard.
     epoch: Option<Epoch>,
+    /// Its cause stands; before, the target only gets ready.
+    started: bool,
+}
+
+impl MoveWatch {
+    pub(super) fn foreseen(now: Instant, from: &RobotId) -> Self {
+        Self { since: now, from: Some(from.clone()), epoch: None, started: false }
+    }
 }
 
 /// What the home before does when it hears of the new one.
@@ -85,8 +94,9 @@ impl Brain {
             records.push(record);
             let until = now + self.not_back_for(key);
             self.left.insert((key.clone(), from.clone()), until);
-            self.moves
-                .insert(key.clone(), MoveWatch { since: now, from: Some(from.clone()), epoch });
+            let from_home = Some(from.clone());
+            let watch = MoveWatch { since: now, from: from_home, epoch, started: true };
+            self.moves.insert(key.clone(), watch);
             let text = format!("{from} -> {}: {reason}", placement.robot);
             self.event_about("move-started", key, text);
         }
@@ -108,32 +118,56 @@ impl Brain {
                 Some((key, assignment.standbys.first()?.clone()))
             })
             .collect();
-        let mut ready = Vec::new();
-        let mut lost = Vec::new();
-        for (key, target) in &preparing {
-            let watch = self.moves.entry(key.clone());
-            let watch = watch.or_insert(MoveWatch { since: now, from: None, epoch: None });
+        let (mut due, mut ready) = (0, Vec::new());
+        let (mut lost, mut called_off) = (Vec::new(), Vec::new());
+        for (key, target) in preparing {
+            let report = self.instance_report(&target, &key);
+            let is_ready = report.is_some_and(|report| report.ready);
+            let watch = self.watch_of(now, &key);
             let late = now >= watch.since + self.config.prepare_max;
-            if late || !self.mesh.is_alive(target) {
-                lost.push((key.clone(), target.clone()));
-            } else if self.instance_report(target, key).is_some_and(|report| report.ready) {
-                ready.push((key.clone(), target.clone()));
+            let place = (key.clone(), target.clone());
+            if !self.mesh.is_alive(&target) || (late && !is_ready) {
+                lost.push(place);
+                continue;
             }
+            match self.call_for(&key) {
+                Call::Foreseen if !watch.started => continue,
+                Call::Over if !watch.started => {
+                    called_off.push(place);
+                    continue;
+                }
+                Call::Due { reason, .. } if !watch.started => {
+                    self.start_foreseen(now, &key, &target, &reason);
+                    let started = MoveWatch { since: now, started: true, ..watch };
+                    self.moves.insert(key, started);
+                }
+                Call::Due { .. } | Call::Foreseen | Call::Over => {}
+            }
+            due += 1;
+            ready.extend(is_ready.then_some(place));
         }
         if !lost.is_empty() {
             self.cancel(now, &lost);
-        } else if !ready.is_empty() && ready.len() == preparing.len() {
+        } else if !called_off.is_empty() {
+            self.call_off_moves(&called_off);
+        } else if due > 0 && ready.len() == due {
             self.switch(&ready);
         }
+    }
+
+    /// What is watched of a move; one that another coordinator began is watched from now on.
+    fn watch_of(&mut self, now: Instant, key: &ComponentKey) -> MoveWatch {
+        let from = self.home(key).cloned();
+        let watch = self.moves.entry(key.clone());
+        watch.or_insert(MoveWatch { since: now, from, epoch: None, started: false }).clone()
     }
 
     /// All that are prepared change homes together.
     fn switch(&mut self, ready: &[(ComponentKey, RobotId)]) {
         let mut records = Vec::new();
         for (key, target) in ready {
-            let reason = self.wanted(key).map(|(_, assignment)| assignment.reason.clone());
-            let Some(record) = self.new_home(key, target, reason.unwrap_or_default(), Old::Drains)
-            else {
+            let reason = self.reason_now(key);
+            let Some(record) = self.new_home(key, target, reason, Old::Drains) else {
                 continue;
             };
             if let Some(watch) = self.moves.get_mut(key) {
@@ -147,12 +181,27 @@ impl Brain {
 
     /// Takes targets back that do not get ready; the components stay where they are.
     fn cancel(&mut self, now: Instant, lost: &[(ComponentKey, RobotId)]) {
-        let mut records = Vec::new();
         for (key, target) in lost {
             self.event_about("move-failed", key, format!("{target} did not get ready"));
-            self.moves.remove(key);
             let until = now + self.not_back_for(key);
             self.left.insert((key.clone(), target.clone()), until);
+        }
+        self.take_targets_back(lost);
+    }
+
+    /// What was foreseen did not come.
+    fn call_off_moves(&mut self, called_off: &[(ComponentKey, RobotId)]) {
+        for (key, target) in called_off {
+            let text = format!("{target} is not needed: the cause is over");
+            self.event_about("move-called-off", key, text);
+        }
+        self.take_targets_back(called_off);
+    }
+
+    fn take_targets_back(&mut self, targets: &[(ComponentKey, RobotId)]) {
+        let mut records = Vec::new();
+        for (key, _) in targets {
+            self.moves.remove(key);
             let Some((version, assignment)) = self.wanted(key) else { continue };
             let value = Assignment { standbys: Vec::new(), ..assignment.clone() };
             let version = Version { revision: version.revision + 1, ..self.next_version(version) };
@@ -184,7 +233,7 @@ impl Brain {
         self.left.retain(|_, until| now < *until);
     }
 
-    fn not_back_for(&self, key: &ComponentKey) -> Duration {
+    pub(super) fn not_back_for(&self, key: &ComponentKey) -> Duration {
         let engine = self.systems.get(&key.system).and_then(|s| self.make_engine(&s.recovery));
         engine.map_or(Duration::ZERO, |engine| engine.recovery.not_back_for())
     }
@@ -224,7 +273,7 @@ impl Brain {
         Some(record(key, version, value))
     }
 
-    fn with_standby(&self, placement: &Placement, reason: &str) -> Option<FleetRecord> {
+    pub(super) fn with_standby(&self, placement: &Placement, reason: &str) -> Option<FleetRecord> {
         let (version, assignment) = self.wanted(&placement.component)?;
         let value = Assignment {
             standbys: vec![placement.robot.clone()],

@@ -30,6 +30,8 @@ pub(super) enum Purpose {
     Deploy,
     /// Components that should leave a robot that still works.
     Move { from: RobotId, cause: Cause, reason: String },
+    /// Components that may have to leave it soon: their next home gets ready.
+    Prepare { from: RobotId, cause: Cause, reason: String },
     /// Components whose home is gone.
     Rehome { reason: String },
 }
@@ -116,6 +118,11 @@ fn topic(system: &Name, purpose: &Purpose) -> String {
         Purpose::Deploy => topic.push_str("/deploy"),
         Purpose::Move { from, cause, .. } => {
             topic.push_str("/move/");
+            topic.push_str(from.as_str());
+            topic.push_str(cause.word());
+        }
+        Purpose::Prepare { from, cause, .. } => {
+            topic.push_str("/prepare/");
             topic.push_str(from.as_str());
             topic.push_str(cause.word());
         }

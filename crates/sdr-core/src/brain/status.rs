@@ -50,9 +50,8 @@ impl Brain {
             api: facts.map(|facts| facts.api.clone()).unwrap_or_default(),
             conditions: conditions
                 .filter_map(|report| match report {
-                    Report::Condition(condition) => {
-                        Some(format!("{}: {}", condition.cause, condition.reason))
-                    }
+                    Report::Condition(condition) => (!condition.foreseen)
+                        .then(|| format!("{}: {}", condition.cause, condition.reason)),
                     Report::Facts(_)
                     | Report::Host(_)
                     | Report::Link(..)

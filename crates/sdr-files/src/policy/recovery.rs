@@ -192,4 +192,7 @@ fn apply_limits(given: LimitsTable, limits: &mut Limits) {
     if let Some(retry) = given.retry {
         limits.retry = retry.value;
     }
+    if let Some(share) = given.prepare_after {
+        limits.prepare_after = share.value;
+    }
 }

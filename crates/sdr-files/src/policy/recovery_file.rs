@@ -3,7 +3,7 @@
 use std::{num::NonZeroU8, time::Duration};
 
 use schemars::{Schema, SchemaGenerator, json_schema};
-use sdr_core::recover::Cause;
+use sdr_core::{recover::Cause, units::Permille};
 use sdr_recovery::{Backoff, Restart, Return, Rung};
 
 use super::conditions::{ClearText, CpuOf, HoldTime, LevelText, Median};
@@ -100,6 +100,9 @@ table! {
         settle: Option<At<Duration>>,
         /// Pause before a refused remedy is asked for again; default 1s..30s.
         retry: Option<At<Backoff>>,
+        /// Share of a condition's `for` after which another robot gets ready; default 50%,
+        /// 100%: never before the time is over.
+        prepare_after: Option<At<Permille>>,
     }
 }
 

@@ -9,7 +9,7 @@ use crate::report::Report;
 const ALLOCATION: [&str; 6] =
     ["role-taken", "deployed", "planned", "plan-failed", "placed", "homeless"];
 /// Kinds that tell how trouble was met.
-const RECOVERY: [&str; 22] = [
+const RECOVERY: [&str; 24] = [
     "condition-raised",
     "condition-cleared",
     "robot-gone",
@@ -23,6 +23,8 @@ const RECOVERY: [&str; 22] = [
     "plan-failed",
     "placed",
     "homeless",
+    "move-foreseen",
+    "move-called-off",
     "move-started",
     "move-prepared",
     "move-failed",
