@@ -3,4 +3,5 @@
 
 mod brain;
 mod e2e;
+mod sim;
 mod tidy;

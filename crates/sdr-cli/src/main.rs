@@ -24,7 +24,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::{
-    command::{completions, deploy, events, logs, status, undeploy, validate},
+    command::{completions, deploy, events, logs, sim, status, undeploy, validate},
     failure::Failure,
     output::{Format, Output},
 };
@@ -69,6 +69,8 @@ enum Command {
     Report(report::ReportArgs),
     /// Run three robots, five components and one move on this machine
     Demo(demo::DemoArgs),
+    /// Run the agents' brains in virtual time, under faults
+    Sim(sim::SimArgs),
     /// Print a completion script for a shell
     Completions(completions::CompletionsArgs),
 }
@@ -94,6 +96,7 @@ async fn run(command: Command, session: &Session) -> Result<ExitCode, Failure> {
         Command::Logs(args) => logs::run(args, session).await,
         Command::Report(args) => report::run(args, session).await,
         Command::Demo(args) => demo::run(args, session).await,
+        Command::Sim(args) => sim::run(args, session),
         Command::Completions(args) => completions::run::<Cli>(args, session),
     }
 }

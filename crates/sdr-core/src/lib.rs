@@ -31,6 +31,7 @@ pub mod id;
 pub mod lifecycle;
 pub mod mesh;
 pub mod order;
+pub mod planted;
 pub mod rng;
 pub mod time;
 pub mod units;

@@ -35,6 +35,7 @@ pub mod device;
 pub mod noise;
 pub mod optics;
 pub mod radio;
+pub mod sim;
 pub mod tunnel;
 pub mod world;
 

@@ -15,7 +15,8 @@ const ABOVE_ALL: [&str; 2] = ["sdr-tests", "sdr-benches"];
 fn may_know(name: &str) -> &'static [&'static str] {
     match name {
         "sdr-core" => &[],
-        "sdr-alloc" | "sdr-recovery" | "sdr-component" | "sdr-lab" => &["sdr-core"],
+        "sdr-alloc" | "sdr-recovery" | "sdr-component" => &["sdr-core"],
+        "sdr-lab" => &["sdr-core", "sdr-alloc", "sdr-recovery"],
         "sdr-files" => &["sdr-core", "sdr-alloc", "sdr-recovery"],
         "sdr-agent" => &["sdr-core", "sdr-alloc", "sdr-recovery", "sdr-files", "sdr-component"],
         "sdr-cli" => &["sdr-core", "sdr-alloc", "sdr-recovery", "sdr-files", "sdr-lab"],

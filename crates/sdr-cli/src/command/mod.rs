@@ -4,6 +4,7 @@ pub(crate) mod completions;
 pub(crate) mod deploy;
 pub(crate) mod events;
 pub(crate) mod logs;
+pub(crate) mod sim;
 pub(crate) mod status;
 pub(crate) mod undeploy;
 pub(crate) mod validate;

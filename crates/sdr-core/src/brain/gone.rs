@@ -6,6 +6,7 @@ use super::Brain;
 use crate::{
     event::Event,
     id::{ComponentKey, Name, RobotId},
+    planted::{self, Defect},
     recover::{Cause, Evidence, Fault, Remedy, RobotEvidence},
     time::{Duration, Instant},
     units::{Bytes, Permille},
@@ -22,6 +23,9 @@ impl Brain {
     /// Whether a robot was heard and is silent now; one that was never heard since the start
     /// gets the same time to speak.
     pub(super) fn is_gone(&self, robot: &RobotId, now: Instant) -> bool {
+        if planted::is(Defect::GoneIgnored) {
+            return false;
+        }
         let waited = now >= self.started_at + self.config.gone_after;
         !self.mesh.is_alive(robot) && (waited || self.mesh.age(robot, now).is_some())
     }

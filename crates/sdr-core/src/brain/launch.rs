@@ -10,6 +10,7 @@ use crate::{
     effect::{Effect, InputWiring, LaunchOrder},
     id::ComponentKey,
     order::{Run, hash64},
+    planted::{self, Defect},
     spec::{ComponentSpec, Qos, port_path},
     time::Instant,
 };
@@ -17,6 +18,9 @@ use crate::{
 impl Brain {
     /// Starts a process unless something speaks against it for now.
     pub(super) fn launch_when_due(&mut self, now: Instant, key: &ComponentKey) {
+        if planted::is(Defect::NoRestart) && self.runs.get(key).is_some_and(|book| book.last > 0) {
+            return;
+        }
         let due = self.restarts.get(key).is_none_or(|restart| now >= restart.at);
         let ending = self.instances.values().any(|instance| instance.component == *key);
         if !due || ending || !self.may_begin(now) || self.is_given_up(key) {

@@ -10,6 +10,8 @@ use crate::{
     input::{RequestId, StoreTicket},
     mesh::FleetRecord,
     order::Run,
+    planted::{self, Defect},
+    record::RecordKind,
     time::{Duration, Instant},
 };
 
@@ -87,6 +89,9 @@ impl Brain {
         records: Vec<FleetRecord>,
         answer: Option<(RequestId, Accepted)>,
     ) {
+        if planted::is(Defect::WireBeforeDisk) {
+            self.mesh.publish(records.clone());
+        }
         let ticket = self.desk.last + 1;
         self.desk.mints.push(Mint { ticket, records, answer });
         self.store_now();
@@ -117,7 +122,11 @@ impl Brain {
         for record in self.desk.mints.iter().flat_map(|mint| &mint.records) {
             fleet.merge(record.clone());
         }
-        let fleet: Vec<StoredRecord> = fleet.to_stored();
+        let mut fleet: Vec<StoredRecord> = fleet.to_stored();
+        fleet.retain(|record| match record.key.kind {
+            RecordKind::ROLE => !planted::is(Defect::TermNotStored),
+            _ => !planted::is(Defect::SystemNotStored),
+        });
         let state = StoredState {
             incarnation: self.mesh.incarnation().counter,
             fleet,

@@ -55,6 +55,7 @@ use crate::{
     input::{Input, InstanceId},
     mesh::{FleetTable, Incarnation, Mesh, MeshConfig, MeshNews},
     order::hash64,
+    planted::{self, Defect},
     recover::{Cause, Fault},
     report::{ConditionReport, HostReport},
     time::{Duration, Instant},
@@ -156,7 +157,8 @@ impl Brain {
         };
         let fleet = FleetTable::from_stored(stored.fleet);
         let mesh = Mesh::new(mesh_config, own, fleet, &stored.peers, now);
-        let runs = stored.runs.into_iter().map(|(key, run)| (key, RunBook::from_disk(run)));
+        let runs = stored.runs.into_iter().filter(|_| !planted::is(Defect::RunNotReserved));
+        let runs = runs.map(|(key, run)| (key, RunBook::from_disk(run)));
         let mut brain = Box::new(Self {
             me: config.robot.clone(),
             config,
@@ -292,6 +294,11 @@ impl Brain {
         self.status_view(now)
     }
 
+    /// What this robot knows of the fleet, to look at.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
     /// Counters of the mesh, for metrics.
     pub fn mesh_counters(&self) -> crate::mesh::MeshCounters {
         self.mesh.counters()
@@ -354,6 +361,11 @@ impl Brain {
                 MeshNews::Alive(robot) => {
                     let text = alloc::format!("{robot} is heard");
                     self.event("robot-alive", text);
+                    if planted::is(Defect::RestartedByHeal) {
+                        let ids: alloc::vec::Vec<InstanceId> =
+                            self.instances.keys().copied().collect();
+                        ids.into_iter().for_each(|id| self.finish(id));
+                    }
                     self.plans.retry_soon();
                     self.stir = Stir::ALL;
                 }

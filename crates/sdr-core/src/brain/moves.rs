@@ -23,6 +23,7 @@ use crate::{
     lifecycle::LifecycleState,
     mesh::FleetRecord,
     order::{Epoch, Version},
+    planted::{self, Defect},
     record::{Assignment, FleetValue, RecordKind},
     time::{Duration, Instant},
 };
@@ -247,6 +248,11 @@ impl Brain {
         let deployment = self.systems.get(&key.system)?.revision;
         let before = self.assignment(key).map(|(version, old)| (version.clone(), old.clone()));
         let epoch = match &before {
+            Some((Version { epoch: Some(epoch), .. }, _))
+                if planted::is(Defect::EpochNotRaised) =>
+            {
+                epoch.clone()
+            }
             Some((Version { epoch: Some(epoch), .. }, _)) => epoch.next(&self.me),
             Some(_) | None => Epoch::first(&self.me),
         };

@@ -10,6 +10,7 @@ use crate::{
     input::InstanceId,
     lifecycle::LifecycleState,
     order::{Epoch, Token},
+    planted::{self, Defect},
     time::Instant,
 };
 
@@ -31,6 +32,7 @@ impl Brain {
         self.update_readiness(now);
         for key in self.mine() {
             match self.duty(&key) {
+                Duty::None if planted::is(Defect::UnwantedGoesOn) => {}
                 Duty::None => self.leave(&key),
                 Duty::Home(epoch) => self.be_home(now, &key, &epoch),
                 Duty::Standby => self.be_standby(now, &key),
@@ -42,6 +44,9 @@ impl Brain {
     pub(super) fn duty(&self, key: &ComponentKey) -> Duty {
         let Some((version, assignment)) = self.wanted(key) else { return Duty::None };
         let Some(epoch) = version.epoch.clone() else { return Duty::None };
+        if let (true, Some(token)) = (planted::is(Defect::NoEpochCheck), self.active_token(key)) {
+            return Duty::Home(token.epoch);
+        }
         if assignment.home == self.me {
             Duty::Home(epoch)
         } else if assignment.standbys.contains(&self.me) {
@@ -50,6 +55,14 @@ impl Brain {
             Duty::Drain(epoch)
         } else {
             Duty::None
+        }
+    }
+
+    /// The token under which a process here was told to be active.
+    fn active_token(&self, key: &ComponentKey) -> Option<Token> {
+        match &self.instances[&self.current(key)?].told {
+            Told::Activate(token) => Some(token.clone()),
+            Told::Nothing | Told::Deactivate | Told::Finish => None,
         }
     }
 

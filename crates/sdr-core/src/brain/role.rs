@@ -11,6 +11,7 @@ use crate::{
     id::RobotId,
     mesh::FleetRecord,
     order::Version,
+    planted::{self, Defect},
     record::{FleetValue, RecordKind, RoleRecord},
     report::{Report, SuccessionReport},
     time::{Duration, Instant},
@@ -57,12 +58,16 @@ impl Brain {
         match holder {
             Some(holder) if holder == self.me => self.hold(now),
             Some(holder) => self.watch_holder(now, &holder),
-            None if self.may_stand(now) && self.candidates().first() == Some(&self.me) => {
+            None if self.may_stand(now) && self.is_first_choice() => {
                 let text = format!("fittest of {}", self.alive_robots().len());
                 self.take_role(&text);
             }
             None => {}
         }
+    }
+
+    fn is_first_choice(&self) -> bool {
+        self.candidates().first() == Some(&self.me) || planted::is(Defect::RoleTakenByAll)
     }
 
     /// Takes the role under the next term.

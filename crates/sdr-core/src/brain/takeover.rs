@@ -10,6 +10,7 @@ use crate::{
     fitness::Alone,
     id::RobotId,
     mesh::Standing,
+    planted::{self, Defect},
     time::{Duration, Instant},
     units::Permille,
 };
@@ -76,6 +77,9 @@ impl Brain {
     }
 
     fn suspect(&mut self, now: Instant, holder: &RobotId, silent: Duration) {
+        if planted::is(Defect::RoleNeverTaken) {
+            return;
+        }
         self.wake_for_role(now + LOOK_EVERY);
         let known = self.desk_of_role.suspicion.clone().filter(|known| known.holder == *holder);
         let Some(suspicion) = known else {
@@ -84,7 +88,9 @@ impl Brain {
             return;
         };
         let wait = self.role_policy().stagger * self.place_in_line();
-        if now < suspicion.since + wait || !self.may_stand(now) || !self.is_unheard(now, holder) {
+        let hasty = planted::is(Defect::RoleTakenByAll);
+        let waits = now < suspicion.since + wait && !hasty;
+        if waits || !self.may_stand(now) || !(hasty || self.is_unheard(now, holder)) {
             return;
         }
         let text = format!("{holder} is silent for {} ms", silent.as_millis());

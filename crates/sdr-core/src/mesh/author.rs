@@ -60,6 +60,11 @@ impl AuthorKey {
         Self(format!("n/{component}"))
     }
 
+    /// The key of what the coordinator says of its successors.
+    pub fn succession() -> Self {
+        Self(String::from("s"))
+    }
+
     /// The key of what was measured of the link to `robot`.
     pub fn link(robot: &RobotId) -> Self {
         Self(format!("l/{robot}"))
@@ -72,6 +77,7 @@ impl AuthorKey {
             Report::Link(robot, _) => Self::link(robot),
             Report::Instance(instance) => Self::instance(&instance.component),
             Report::Condition(condition) => Self::condition(&condition.system, condition.cause),
+            Report::Succession(_) => Self::succession(),
             Report::Homeless(homeless) => Self::homeless(&homeless.component),
         }
     }

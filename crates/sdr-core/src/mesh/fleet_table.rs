@@ -15,6 +15,7 @@ use super::{
 use crate::{
     effect::StoredRecord,
     order::{Version, hash64},
+    planted::{self, Defect},
     record::{FleetKey, FleetValue, RECORD_BYTES_MAX, RecordKind},
 };
 
@@ -117,7 +118,11 @@ impl FleetTable {
         }
         match self.records.get(&record.key) {
             Some((known, _)) if *known == record => return Merge::Known,
-            Some((known, _)) if known.rank() > record.rank() => return Merge::Older,
+            Some((known, _))
+                if known.rank() > record.rank() && !planted::is(Defect::NoVersionOrder) =>
+            {
+                return Merge::Older;
+            }
             None if self.records.len() >= RECORDS_MAX => return Merge::Refused,
             Some(_) | None => {}
         }
@@ -129,9 +134,13 @@ impl FleetTable {
             | FleetValue::Recovery(_)
             | FleetValue::Assignment(_)
             | FleetValue::Role(_)
+            | FleetValue::RolePolicy(_)
             | FleetValue::Unknown => None,
         };
         self.put(record, value);
+        if planted::is(Defect::TombstoneDropped) {
+            self.drop_tombstones();
+        }
         if let Some((name, revision)) = system {
             self.drop_parts_before(&name, revision);
         }
@@ -158,6 +167,19 @@ impl FleetTable {
         self.records
             .range(from..)
             .take_while(move |(key, _)| key.kind == kind)
+            .map(|(key, (record, value))| (key, &record.version, value))
+    }
+
+    /// All values of a kind whose names begin with `prefix`, by name.
+    pub fn below<'a>(
+        &'a self,
+        kind: RecordKind,
+        prefix: &'a str,
+    ) -> impl Iterator<Item = (&'a FleetKey, &'a Version, &'a FleetValue)> {
+        let from = FleetKey { kind, name: String::from(prefix) };
+        self.records
+            .range(from..)
+            .take_while(move |(key, _)| key.kind == kind && key.name.starts_with(prefix))
             .map(|(key, (record, value))| (key, &record.version, value))
     }
 
@@ -243,6 +265,18 @@ impl FleetTable {
                 self.hashes.insert((hash, key));
             }
         }
+    }
+
+    /// What no table may do: see [`Defect::TombstoneDropped`].
+    fn drop_tombstones(&mut self) {
+        let is_dead = |value: &FleetValue| matches!(value, FleetValue::System(s) if !s.wanted);
+        let dead: Vec<FleetKey> = self
+            .records
+            .iter()
+            .filter(|(_, (_, value))| is_dead(value))
+            .map(|(key, _)| key.clone())
+            .collect();
+        dead.iter().for_each(|key| self.drop_record(key));
     }
 
     fn drop_record(&mut self, key: &FleetKey) {

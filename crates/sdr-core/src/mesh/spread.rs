@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     id::RobotId,
+    planted::{self, Defect},
     record::{FleetKey, FleetValue},
     time::Instant,
 };
@@ -230,6 +231,7 @@ impl Mesh {
                     fresh.push(key);
                 }
                 Merge::Older => newer.extend(self.fleet.record(&key).cloned()),
+                Merge::Known if planted::is(Defect::EndlessEcho) => fresh.push(key),
                 Merge::Known => {}
                 Merge::Refused => self.counters.refused += 1,
             }

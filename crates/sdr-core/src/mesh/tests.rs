@@ -38,7 +38,12 @@ fn mesh(number: usize, robots: usize, counter: u64) -> Mesh {
 }
 
 fn role(holder: usize, term: u64) -> FleetRecord {
-    let value = FleetValue::Role(RoleRecord { holder: robot(holder), term, fitness: 1 });
+    let value = FleetValue::Role(RoleRecord {
+        holder: robot(holder),
+        term,
+        fitness: 1,
+        by_operator: false,
+    });
     let version = Version { epoch: None, revision: 0, term, author: robot(holder) };
     FleetRecord::new(RecordKind::ROLE, "".into(), version, &value)
 }
@@ -106,6 +111,7 @@ impl Bench {
             | Report::Link(..)
             | Report::Instance(_)
             | Report::Condition(_)
+            | Report::Succession(_)
             | Report::Homeless(_) => None,
         })
     }

@@ -1,0 +1,92 @@
+//! After the faults: each wanted component active exactly once, where its assignment says;
+//! one coordinator whom all know; equal tables; every connection carries the latest token.
+
+use sdr_core::{
+    mesh::FleetTable,
+    record::{FleetValue, RecordKind},
+};
+
+use crate::sim::{Fleet, table_hash};
+
+/// Records compared byte by byte; of larger fleets the first robots stand for all.
+const RECORDS_MAX: usize = 100_000;
+
+/// What is not right yet; `None` when all is.
+pub fn lacking(fleet: &Fleet) -> Option<String> {
+    let on: Vec<usize> =
+        (0..fleet.robots.len()).filter(|robot| fleet.robots[*robot].is_on()).collect();
+    one_coordinator(fleet, &on)
+        .or_else(|| equal_tables(fleet, &on))
+        .or_else(|| each_once(fleet, &on))
+        .or_else(|| all_heard(fleet))
+}
+
+/// All know one coordinator, which knows it too.
+pub fn one_coordinator(fleet: &Fleet, on: &[usize]) -> Option<String> {
+    let first = fleet.robots[*on.first()?].coordinator();
+    let Some((holder, term)) = first else { return Some("nobody coordinates".into()) };
+    for robot in on {
+        let robot = &fleet.robots[*robot];
+        match robot.coordinator() {
+            Some(known) if known == (holder, term) => {}
+            Some((other, _)) => return Some(format!("{} follows {other}, not {holder}", robot.id)),
+            None => return Some(format!("{} knows no coordinator", robot.id)),
+        }
+    }
+    let holds = on.iter().any(|robot| fleet.robots[*robot].id == *holder);
+    (!holds).then(|| format!("{holder} coordinates and is off"))
+}
+
+fn equal_tables(fleet: &Fleet, on: &[usize]) -> Option<String> {
+    let length = |robot: &usize| fleet.table(*robot).map(FleetTable::len);
+    let first = length(on.first()?);
+    if let Some(other) = on.iter().find(|robot| length(robot) != first) {
+        return Some(format!(
+            "tables of robot-{} and robot-{} differ in length",
+            on[0] + 1,
+            other + 1
+        ));
+    }
+    let compared = on.len().min((RECORDS_MAX / first?.max(1)).max(2));
+    let hash = |robot: &usize| fleet.table(*robot).map(table_hash);
+    let first = hash(on.first()?);
+    let other = on[..compared].iter().find(|robot| hash(robot) != first)?;
+    Some(format!("tables of robot-{} and robot-{} differ", on[0] + 1, other + 1))
+}
+
+fn each_once(fleet: &Fleet, on: &[usize]) -> Option<String> {
+    let wanted = fleet.wanted(on);
+    let table = fleet.table(*on.first()?)?;
+    for key in &wanted {
+        let active = fleet.active(key);
+        let [only] = active else {
+            return Some(format!("{key} is active {} times", active.len()));
+        };
+        let home = match table.get(RecordKind::ASSIGNMENT, &key.to_string()) {
+            Some((_, FleetValue::Assignment(assignment))) => Some(&assignment.home),
+            Some(_) | None => None,
+        };
+        let place = &fleet.robots[only.robot].id;
+        if home != Some(place) {
+            return Some(format!("{key} is active on {place}, not at its home {home:?}"));
+        }
+    }
+    let extra = (0..fleet.components()).find(|component| {
+        !fleet.active_of(*component).is_empty() && !wanted.contains(fleet.key(*component))
+    })?;
+    Some(format!("{} is active and nobody wants it", fleet.key(extra)))
+}
+
+fn all_heard(fleet: &Fleet) -> Option<String> {
+    for robot in &fleet.robots {
+        for (_, process) in robot.processes() {
+            if process.token.is_none() {
+                continue;
+            }
+            if let Some(deaf) = fleet.unheard(process) {
+                return Some(format!("{} does not hear {deaf}", process.component));
+            }
+        }
+    }
+    None
+}

@@ -1,0 +1,93 @@
+//! A heal restarts nothing that was right.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use sdr_core::{id::Name, time::Instant};
+
+use crate::sim::{ActiveProcess, Broken, Checker, Fleet, Sight};
+
+/// So long after a heal, with nothing else going wrong, the same processes must be active.
+const SETTLED: Duration = Duration::from_secs(12);
+
+/// `restarted-by-heal`.
+#[derive(Debug, Default)]
+pub struct Heals {
+    healed_at: Option<Instant>,
+    before: BTreeMap<usize, Vec<ActiveProcess>>,
+}
+
+impl Checker for Heals {
+    fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
+        match sight {
+            Sight::Healed if !fleet.is_cut() => {
+                self.healed_at = Some(fleet.now);
+                self.before = (0..fleet.components())
+                    .map(|component| (component, fleet.active_of(component).to_vec()))
+                    .filter(|(_, active)| !active.is_empty())
+                    .collect();
+                None
+            }
+            // an operator wants something else, or a component is in trouble of its own
+            Sight::Asked { system, .. } => self.excuse(fleet, system, None),
+            Sight::Told { event, .. } => {
+                let trouble =
+                    ["exited", "hung", "error", "condition-raised", "move-started", "restart"];
+                match &event.system {
+                    Some(system) if trouble.contains(&event.kind.as_str()) => {
+                        self.excuse(fleet, system, event.component.as_ref())
+                    }
+                    Some(_) | None => None,
+                }
+            }
+            Sight::Off { .. } | Sight::On { .. } => {
+                self.healed_at = None;
+                None
+            }
+            Sight::Look => self.look(fleet),
+            _ => None,
+        }
+    }
+}
+
+impl Heals {
+    fn excuse(&mut self, fleet: &Fleet, system: &Name, component: Option<&Name>) -> Option<Broken> {
+        self.before.retain(|number, _| {
+            let key = fleet.key(*number);
+            key.system != *system || component.is_some_and(|name| key.name != *name)
+        });
+        None
+    }
+
+    fn look(&mut self, fleet: &Fleet) -> Option<Broken> {
+        let healed_at = self.healed_at?;
+        if fleet.steady_since() > healed_at + Duration::from_millis(1) {
+            self.healed_at = None;
+            return None;
+        }
+        if fleet.now < healed_at + SETTLED {
+            return None;
+        }
+        self.healed_at = None;
+        self.before.iter().find_map(|(component, before)| {
+            let stays = fleet.active_of(*component).iter().any(|now| {
+                before.iter().any(|then| (then.robot, then.instance) == (now.robot, now.instance))
+            });
+            (!stays).then(|| {
+                let places: Vec<String> =
+                    before.iter().map(|then| format!("robot-{}", then.robot + 1)).collect();
+                let now: Vec<String> = fleet
+                    .active_of(*component)
+                    .iter()
+                    .map(|now| format!("robot-{}", now.robot + 1))
+                    .collect();
+                let what = format!(
+                    "{} was active on {}, now on [{}]",
+                    fleet.key(*component),
+                    places.join(" and "),
+                    now.join(", ")
+                );
+                Broken::new("restarted-by-heal", what)
+            })
+        })
+    }
+}

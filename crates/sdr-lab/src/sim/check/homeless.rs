@@ -1,0 +1,91 @@
+//! No component is without an active process for longer than detection and 3 s, while the
+//! robots that could run it are together and nothing else goes wrong.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use sdr_core::{id::ComponentKey, time::Instant};
+
+use crate::sim::{Broken, Checker, Fleet, Sight};
+
+/// A robot that vanished is found by then (p99 of the bar).
+const DETECTION: Duration = Duration::from_secs(12);
+/// From then on, until its components run elsewhere.
+const REHOMED: Duration = Duration::from_secs(3);
+/// A component whose ladder was climbed is left alone by its robots for so long
+/// (`not_back_for`, with what it takes to notice).
+const TROUBLED: Duration = Duration::from_secs(135);
+/// What brains say when a component is in trouble of its own.
+const TROUBLE: [&str; 9] = [
+    "exited",
+    "hung",
+    "error",
+    "held",
+    "restart",
+    "condition-raised",
+    "move-started",
+    "move-failed",
+    "respecified",
+];
+
+/// `homeless-too-long`.
+#[derive(Debug, Default)]
+pub struct Homeless {
+    /// By the first robot of a side and the component.
+    since: BTreeMap<(usize, ComponentKey), Instant>,
+    troubled: BTreeMap<ComponentKey, Instant>,
+}
+
+impl Checker for Homeless {
+    fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
+        match sight {
+            Sight::Told { event, .. } if TROUBLE.contains(&event.kind.as_str()) => {
+                if let (Some(system), Some(name)) = (&event.system, &event.component) {
+                    self.troubled.insert(ComponentKey::new(system, name), fleet.now);
+                }
+                None
+            }
+            Sight::Asked { system, .. } => {
+                // a new revision begins its own count
+                self.since.retain(|(_, key), _| key.system != *system);
+                None
+            }
+            Sight::Look => self.look(fleet),
+            _ => None,
+        }
+    }
+}
+
+impl Homeless {
+    fn look(&mut self, fleet: &Fleet) -> Option<Broken> {
+        let mut since = BTreeMap::new();
+        let mut found = None;
+        for side in fleet.sides() {
+            // a robot alone decides nothing for others
+            if side.len() < 2 && fleet.robots.len() > 2 {
+                continue;
+            }
+            for key in fleet.wanted(&side) {
+                if fleet.active(&key).iter().any(|active| side.contains(&active.robot)) {
+                    continue;
+                }
+                let name = (side[0], key.clone());
+                let begun = self.since.get(&name).copied().unwrap_or(fleet.now);
+                since.insert(name, begun);
+                let clear = begun.max(fleet.steady_since());
+                let late = fleet.now >= clear + DETECTION + REHOMED
+                    && fleet.is_steady_for(DETECTION + REHOMED);
+                let troubled = self.troubled.get(&key).is_some_and(|at| fleet.now < *at + TROUBLED);
+                if late && !troubled {
+                    let what = format!(
+                        "{key} for {:.1} s, among {} robots",
+                        fleet.now.since(begun).as_secs_f64(),
+                        side.len()
+                    );
+                    found = found.or(Some(Broken::new("homeless-too-long", what)));
+                }
+            }
+        }
+        self.since = since;
+        found
+    }
+}

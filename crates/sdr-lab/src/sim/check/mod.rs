@@ -1,0 +1,34 @@
+//! The rules, one file each.
+
+mod bounds;
+mod coordinators;
+mod deployments;
+mod heals;
+mod homeless;
+mod orders;
+mod tokens;
+
+pub mod convergence;
+
+pub use bounds::Bounds;
+pub use coordinators::Coordinators;
+pub use deployments::Deployments;
+pub use heals::Heals;
+pub use homeless::Homeless;
+pub use orders::Orders;
+pub use tokens::Tokens;
+
+use super::Checker;
+
+/// All checkers that watch from the beginning.
+pub(crate) fn all() -> Vec<Box<dyn Checker>> {
+    vec![
+        Box::<Tokens>::default(),
+        Box::<Orders>::default(),
+        Box::<Homeless>::default(),
+        Box::<Coordinators>::default(),
+        Box::<Heals>::default(),
+        Box::<Deployments>::default(),
+        Box::<Bounds>::default(),
+    ]
+}

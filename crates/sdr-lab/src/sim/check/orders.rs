@@ -1,0 +1,105 @@
+//! Epochs, terms and revisions never go back, also through restarts; what others hold of a
+//! robot's making is on its disk; one version has one value.
+
+use std::collections::BTreeMap;
+
+use sdr_core::{
+    mesh::FleetRecord,
+    order::{Version, hash64},
+    record::{FleetKey, RecordKind},
+};
+
+use crate::sim::{Broken, Checker, Fleet, Sight};
+
+/// Kinds that carry an order.
+const ORDERED: [RecordKind; 3] = [RecordKind::SYSTEM, RecordKind::ASSIGNMENT, RecordKind::ROLE];
+/// More records than this, over all robots, are not looked at one by one.
+const RECORDS_MAX: usize = 20_000;
+
+/// `order-went-back`, `wire-before-disk`, `version-twice`.
+#[derive(Debug, Default)]
+pub struct Orders {
+    /// By robot: the start of its agent, and the versions it held then.
+    held: BTreeMap<usize, (u64, BTreeMap<FleetKey, Version>)>,
+    /// The value under each version ever seen of a home or the role.
+    values: BTreeMap<(FleetKey, Version), u64>,
+}
+
+impl Checker for Orders {
+    fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
+        match sight {
+            Sight::On { robot, disk_kept: true } => wire_before_disk(fleet, *robot),
+            Sight::Look => {
+                let robots = 0..fleet.robots.len();
+                let count: usize =
+                    robots.clone().filter_map(|robot| fleet.table(robot)).map(|t| t.len()).sum();
+                match count > RECORDS_MAX {
+                    true => None,
+                    false => robots.into_iter().find_map(|robot| self.look(fleet, robot)),
+                }
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Orders {
+    fn look(&mut self, fleet: &Fleet, robot: usize) -> Option<Broken> {
+        let life = fleet.robots[robot].life();
+        let now: BTreeMap<FleetKey, Version> = records(fleet, robot)
+            .map(|record| (record.key.clone(), record.version.clone()))
+            .collect();
+        let (then, before) = self.held.insert(robot, (life, now.clone())).unwrap_or_default();
+        let back = before
+            .iter()
+            .find(|(key, version)| then == life && now.get(*key).is_none_or(|now| now < *version));
+        if let Some((key, version)) = back {
+            let what = format!("robot-{} held {} {version:?}", robot + 1, key.name);
+            return Some(Broken::new("order-went-back", what));
+        }
+        records(fleet, robot).find_map(|record| self.value_of(record))
+    }
+
+    fn value_of(&mut self, record: &FleetRecord) -> Option<Broken> {
+        if record.key.kind == RecordKind::SYSTEM {
+            return None;
+        }
+        let value = hash64(&record.value);
+        let name = (record.key.clone(), record.version.clone());
+        let before = *self.values.entry(name).or_insert(value);
+        (before != value).then(|| {
+            let what = format!("two values of {} {:?}", record.key.name, record.version);
+            Broken::new("version-twice", what)
+        })
+    }
+}
+
+fn records(fleet: &Fleet, robot: usize) -> impl Iterator<Item = &FleetRecord> {
+    let table = fleet.table(robot).into_iter();
+    table.flat_map(|table| {
+        let keys = ORDERED.into_iter().flat_map(|kind| table.of_kind(kind));
+        keys.filter_map(|(key, _, _)| table.record(key))
+    })
+}
+
+/// What a robot made and others hold must be on its own disk.
+fn wire_before_disk(fleet: &Fleet, robot: usize) -> Option<Broken> {
+    let me = &fleet.robots[robot].id;
+    let own = fleet.table(robot)?;
+    let others = (0..fleet.robots.len()).filter(|other| *other != robot).take(50);
+    for other in others {
+        let mine = records(fleet, other).filter(|record| record.version.author == *me);
+        for record in mine {
+            if own.record(&record.key).is_none_or(|own| own.version < record.version) {
+                let what = format!(
+                    "robot-{} holds {} {:?}, which {me} made and has not on its disk",
+                    other + 1,
+                    record.key.name,
+                    record.version
+                );
+                return Some(Broken::new("wire-before-disk", what));
+            }
+        }
+    }
+    None
+}

@@ -1,0 +1,123 @@
+//! The disk of one robot: takes its time, may be full, and a crash may come in between.
+
+use std::time::Duration;
+
+use sdr_core::{effect::StoredState, input::StoreTicket};
+
+/// Time a write takes on a healthy disk.
+pub(crate) const STORE_TIME: Duration = Duration::from_millis(3);
+
+/// An order to store.
+#[derive(Debug)]
+pub(crate) struct Order {
+    pub(crate) ticket: StoreTicket,
+    pub(crate) state: StoredState,
+}
+
+/// One order is written at a time; of those that wait only the newest counts, as each holds
+/// all before it.
+#[derive(Debug)]
+pub(crate) struct Disk {
+    held: Option<StoredState>,
+    writing: Option<Order>,
+    waiting: Option<Order>,
+    /// Whether the robot will ever read it; a state that nobody reads is not kept.
+    pub(crate) is_read: bool,
+    pub(crate) full: bool,
+    pub(crate) time: Duration,
+}
+
+impl Disk {
+    pub(crate) fn new() -> Self {
+        Self {
+            held: None,
+            writing: None,
+            waiting: None,
+            is_read: true,
+            full: false,
+            time: STORE_TIME,
+        }
+    }
+
+    /// Takes an order; true when its write begins now.
+    pub(crate) fn order(&mut self, order: Order) -> bool {
+        if self.writing.is_some() {
+            self.waiting = Some(order);
+            return false;
+        }
+        self.writing = Some(order);
+        true
+    }
+
+    /// The write under way is over; true when the next one begins.
+    pub(crate) fn finish(&mut self) -> (Option<StoreTicket>, bool) {
+        let Some(order) = self.writing.take() else { return (None, false) };
+        let ticket = order.ticket;
+        if !self.full && self.is_read {
+            self.held = Some(order.state);
+        }
+        self.writing = self.waiting.take();
+        (Some(ticket), self.writing.is_some())
+    }
+
+    /// Power is lost; what was being written is there or not.
+    pub(crate) fn crash(&mut self, written: Written) {
+        self.waiting = None;
+        let under_way = self.writing.take();
+        match written {
+            Written::Whole if !self.full => {
+                self.held = under_way.map(|o| o.state).or(self.held.take())
+            }
+            Written::Whole | Written::NotAtAll => {}
+        }
+    }
+
+    pub(crate) fn wipe(&mut self) {
+        *self = Self { is_read: self.is_read, ..Self::new() };
+    }
+
+    pub(crate) fn held(&self) -> Option<&StoredState> {
+        self.held.as_ref()
+    }
+}
+
+/// What a crash leaves of the write under way; a file is replaced as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Written {
+    Whole,
+    NotAtAll,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn order(ticket: StoreTicket) -> Order {
+        Order { ticket, state: StoredState { incarnation: ticket, ..StoredState::default() } }
+    }
+
+    fn held(disk: &Disk) -> Option<u64> {
+        disk.held().map(|state| state.incarnation)
+    }
+
+    #[test]
+    fn the_newest_of_those_that_wait_is_written_next() {
+        let mut disk = Disk::new();
+        assert!(disk.order(order(1)) && !disk.order(order(2)) && !disk.order(order(3)));
+        assert_eq!((disk.finish(), held(&disk)), ((Some(1), true), Some(1)));
+        assert_eq!((disk.finish(), held(&disk)), ((Some(3), false), Some(3)));
+    }
+
+    #[test]
+    fn a_crash_keeps_the_old_state_or_the_new_one() {
+        for (written, left) in [(Written::NotAtAll, 1), (Written::Whole, 2)] {
+            let mut disk = Disk::new();
+            disk.order(order(1));
+            disk.finish();
+            disk.order(order(2));
+            disk.order(order(3));
+            disk.crash(written);
+            assert_eq!((held(&disk), disk.finish().0), (Some(left), None));
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! Measures what the figures are made of, by watching.
+
+use sdr_core::{
+    event::Event,
+    id::RobotId,
+    record::RecordKind,
+    time::{Duration, Instant},
+};
+
+use super::{Fleet, Record, Sight, check::convergence, table_hash};
+
+/// Silence after which an observer may rightly say "gone", at the default.
+const GONE_AFTER: Duration = Duration::from_secs(10);
+
+/// A robot that was killed on purpose.
+#[derive(Debug)]
+struct Kill {
+    robot: usize,
+    at: Instant,
+    gone: Vec<bool>,
+    quiet: Vec<bool>,
+}
+
+/// A robot that starts with an empty disk.
+#[derive(Debug)]
+struct Join {
+    robot: usize,
+    bytes_before: u64,
+}
+
+/// Watches one run.
+#[derive(Debug, Default)]
+pub(crate) struct Measure {
+    pub(crate) record: Record,
+    kills: Vec<Kill>,
+    /// When the coordinator was killed, and its term.
+    beheaded: Option<(Instant, u64)>,
+    join: Option<Join>,
+    /// Where each component was at home: component, epoch number, home.
+    homes: std::collections::BTreeMap<String, (sdr_core::order::Epoch, RobotId)>,
+    troubled: std::collections::BTreeMap<usize, Instant>,
+}
+
+impl Measure {
+    /// `robot` is about to lose power.
+    pub(crate) fn kill(&mut self, fleet: &Fleet, robot: usize) {
+        let watches = |observer: usize| {
+            observer != robot
+                && fleet.robots[observer].is_on()
+                && fleet.apart_for(observer, robot).is_none()
+        };
+        // a robot that does not watch has nothing to say
+        let blind: Vec<bool> = (0..fleet.robots.len()).map(|observer| !watches(observer)).collect();
+        self.kills.push(Kill { robot, at: fleet.now, gone: blind.clone(), quiet: blind });
+        if fleet.highest_coordinator() == Some(robot) {
+            let term = fleet.robots[robot].coordinator().map_or(0, |(_, term)| term);
+            self.beheaded = Some((fleet.now, term));
+        }
+    }
+
+    /// A killed robot comes back: who has not noticed by now never will.
+    pub(crate) fn revive(&mut self, robot: usize) {
+        self.kills.retain(|kill| kill.robot != robot);
+    }
+
+    /// `robot` starts with an empty disk.
+    pub(crate) fn join(&mut self, fleet: &Fleet, robot: usize) {
+        self.join = Some(Join { robot, bytes_before: bytes_of(fleet, robot) });
+    }
+
+    pub(crate) fn see(&mut self, fleet: &Fleet, sight: &Sight) {
+        match sight {
+            Sight::Told { robot, event } => self.told(fleet, *robot, event),
+            Sight::Look => self.look(fleet),
+            _ => {}
+        }
+    }
+
+    fn told(&mut self, fleet: &Fleet, observer: usize, event: &Event) {
+        match event.kind.as_str() {
+            "robot-gone" => self.judged(fleet, observer, event, true),
+            "robot-quiet" => self.judged(fleet, observer, event, false),
+            "condition-raised" | "hung" | "exited" | "error" | "held" => {
+                self.troubled.insert(observer, fleet.now);
+            }
+            _ => {}
+        }
+        if let Some((at, term)) = self.beheaded
+            && fleet.robots[observer].coordinator().is_some_and(|(_, now)| now > term)
+            && fleet.robots[observer].is_coordinator()
+        {
+            self.record.coordinator_gap_ms.push(ms(fleet.now.since(at)));
+            self.beheaded = None;
+        }
+    }
+
+    fn judged(&mut self, fleet: &Fleet, observer: usize, event: &Event, gone: bool) {
+        let words = event.reason.split(|c: char| !(c.is_alphanumeric() || c == '-'));
+        let named = words.filter_map(|word| RobotId::new(word).ok());
+        let target =
+            named.filter_map(|id| fleet.robot_number(&id)).find(|robot| *robot != observer);
+        let Some(target) = target else { return };
+        if let Some(kill) = self.kills.iter_mut().find(|kill| kill.robot == target) {
+            let noted = if gone { &mut kill.gone[observer] } else { &mut kill.quiet[observer] };
+            if !std::mem::replace(noted, true) {
+                let took = ms(fleet.now.since(kill.at));
+                match gone {
+                    true => self.record.detection_ms.push(took),
+                    false => self.record.quiet_ms.push(took),
+                }
+            }
+        } else if gone && is_false(fleet, observer, target) {
+            self.record.false_deaths += 1;
+        }
+    }
+
+    fn look(&mut self, fleet: &Fleet) {
+        self.look_at_join(fleet);
+        self.look_at_homes(fleet);
+    }
+
+    fn look_at_join(&mut self, fleet: &Fleet) {
+        let Some(join) = &self.join else { return };
+        let (Some(own), Some(holder)) = (fleet.table(join.robot), fleet.highest_coordinator())
+        else {
+            return;
+        };
+        let Some(table) = fleet.table(holder).filter(|_| holder != join.robot) else { return };
+        if table.len() == own.len() && table_hash(table) == table_hash(own) {
+            let bytes = bytes_of(fleet, join.robot) - join.bytes_before;
+            self.record.join_bytes.push(bytes as f64);
+            self.join = None;
+        }
+    }
+
+    /// Moves: a home under a new epoch on another robot, as the coordinator's table has it.
+    fn look_at_homes(&mut self, fleet: &Fleet) {
+        let Some(holder) = fleet.highest_coordinator() else { return };
+        let Some(table) = fleet.table(holder) else { return };
+        for (key, version, value) in table.of_kind(RecordKind::ASSIGNMENT) {
+            let (Some(epoch), sdr_core::record::FleetValue::Assignment(now)) =
+                (&version.epoch, value)
+            else {
+                continue;
+            };
+            let known = self.homes.get(&key.name);
+            if known.is_some_and(|(before, _)| before >= epoch) {
+                continue;
+            }
+            let before = self.homes.insert(key.name.clone(), (epoch.clone(), now.home.clone()));
+            let Some((_, from)) = before.filter(|(_, from)| *from != now.home) else { continue };
+            self.record.moves += 1;
+            if fleet.robot_number(&from).is_some_and(|from| self.was_well(fleet, from)) {
+                self.record.needless_moves += 1;
+            }
+        }
+    }
+
+    /// Whether a robot has been up, reachable and without trouble for a while.
+    fn was_well(&self, fleet: &Fleet, robot: usize) -> bool {
+        let up = fleet.robots[robot].is_on()
+            && fleet.now.since(fleet.robots[robot].on_since()) >= GONE_AFTER;
+        let apart = (0..fleet.robots.len()).filter_map(|other| fleet.apart_for(robot, other)).max();
+        let troubled =
+            self.troubled.get(&robot).is_some_and(|at| fleet.now.since(*at) < GONE_AFTER * 6);
+        up && apart.is_none_or(|apart| apart < GONE_AFTER) && !troubled
+    }
+
+    /// Whether everything runs as it should; why not.
+    pub(crate) fn lacking(fleet: &Fleet) -> Option<String> {
+        convergence::lacking(fleet)
+    }
+}
+
+/// Whether a judgement "gone" was wrong: the robot was up for at least as long as silence must
+/// last, and whatever kept the two apart (deafness, a cut, an agent that stands still), if
+/// anything did, is shorter than that from its beginning to its end.
+fn is_false(fleet: &Fleet, observer: usize, target: usize) -> bool {
+    let robot = &fleet.robots[target];
+    let up = robot.is_on() && fleet.now.since(robot.on_since()) >= GONE_AFTER;
+    up && fleet.apart_for(observer, target).is_none_or(|apart| apart < GONE_AFTER)
+}
+
+fn bytes_of(fleet: &Fleet, robot: usize) -> u64 {
+    fleet.tally.sent_bytes[robot] + fleet.tally.received_bytes[robot]
+}
+
+fn ms(time: Duration) -> f64 {
+    time.as_secs_f64() * 1000.0
+}

@@ -1,0 +1,240 @@
+//! One robot: a brain, its clock, its disk, its processes.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use sdr_core::{
+    api::StatusView,
+    brain::{Brain, BrainConfig, Seams},
+    effect::{Direction, Route},
+    id::RobotId,
+    input::InstanceId,
+    lifecycle::LifecycleState,
+    order::Token,
+    record::{FleetValue, RecordKind},
+    report::{HostReport, RobotFacts, RolePreference},
+    time::Instant,
+    units::{Bytes, Permille},
+};
+
+use super::{
+    air::address,
+    clock::Clock,
+    disk::Disk,
+    process::{Behaviour, Process},
+};
+
+/// Memory that the agent itself takes.
+const AGENT_MEMORY: Bytes = Bytes::mega(12);
+
+/// One robot of the simulated fleet.
+pub struct Robot {
+    /// Its name.
+    pub id: RobotId,
+    /// What it measures, before its processes are added.
+    pub host: HostReport,
+    /// Its body and limits.
+    pub facts: RobotFacts,
+    /// How processes of a component (by name) behave here; as usual when absent.
+    pub behaviours: BTreeMap<String, Behaviour>,
+    /// Starts of processes so far.
+    pub launches: usize,
+    pub(crate) number: usize,
+    /// Starts of the agent so far; what was due for an earlier one is dropped.
+    pub(crate) life: u64,
+    pub(crate) on_since: Instant,
+    pub(crate) brain: Option<Box<Brain>>,
+    pub(crate) clock: Clock,
+    pub(crate) drift_ppm: i64,
+    pub(crate) disk: Disk,
+    pub(crate) processes: BTreeMap<InstanceId, Process>,
+    pub(crate) outs: BTreeMap<String, Option<Token>>,
+    pub(crate) ins: BTreeMap<String, ()>,
+    pub(crate) wake_at: Option<Instant>,
+    pub(crate) paused_at: Instant,
+    pub(crate) paused_until: Instant,
+    /// Datagrams in the socket's buffer while the loop stands still.
+    pub(crate) backlog: usize,
+    /// Loses power in the middle of its next write, for so long.
+    pub(crate) crash_at_store: Option<Duration>,
+    /// It does not come back.
+    pub(crate) is_lost: bool,
+    /// Most effects of one `handle` so far.
+    pub(crate) effects_max: usize,
+    /// Longest datagram so far.
+    pub(crate) datagram_bytes_max: usize,
+}
+
+impl Robot {
+    pub(crate) fn new(number: usize, facts: RobotFacts, drift_ppm: i64) -> Self {
+        Self {
+            id: RobotId::new(&format!("robot-{}", number + 1)).expect("a number makes a name"),
+            host: HostReport { memory_used: AGENT_MEMORY, ..HostReport::default() },
+            facts,
+            behaviours: BTreeMap::new(),
+            launches: 0,
+            number,
+            life: 0,
+            on_since: Instant::ZERO,
+            brain: None,
+            clock: Clock::new(Instant::ZERO, Instant::ZERO, drift_ppm),
+            drift_ppm,
+            disk: Disk::new(),
+            processes: BTreeMap::new(),
+            outs: BTreeMap::new(),
+            ins: BTreeMap::new(),
+            wake_at: None,
+            paused_at: Instant::ZERO,
+            paused_until: Instant::ZERO,
+            backlog: 0,
+            crash_at_store: None,
+            is_lost: false,
+            effects_max: 0,
+            datagram_bytes_max: 0,
+        }
+    }
+
+    /// Starts the agent from what is on its disk, its clock showing `shown`.
+    pub(crate) fn start(&mut self, now: Instant, shown: Instant, robots: usize) {
+        self.life += 1;
+        self.on_since = now;
+        self.clock = Clock::new(now, shown, self.drift_ppm);
+        self.paused_until = now;
+        self.backlog = 0;
+        self.wake_at = None;
+        let config = BrainConfig {
+            seeds: (0..robots).map(address).collect(),
+            listen: Some(address(self.number)),
+            seed: (self.life << 40) ^ (self.number as u64) << 33,
+            ..BrainConfig::new(self.id.clone(), self.facts.clone())
+        };
+        let seams = Seams { recovery: Box::new(sdr_recovery::make) };
+        self.brain = Some(Brain::new(config, seams, self.disk.held().cloned(), shown));
+    }
+
+    /// Power is gone: agent, processes, routes.
+    pub(crate) fn stop(&mut self) -> BTreeMap<InstanceId, Process> {
+        self.brain = None;
+        self.life += 1;
+        self.outs.clear();
+        self.ins.clear();
+        self.crash_at_store = None;
+        std::mem::take(&mut self.processes)
+    }
+
+    /// Whether its agent runs.
+    pub fn is_on(&self) -> bool {
+        self.brain.is_some()
+    }
+
+    /// Its brain, while it is on.
+    pub fn brain(&self) -> Option<&Brain> {
+        self.brain.as_deref()
+    }
+
+    /// What it believes at the virtual moment `now`; `None` while it is off.
+    pub fn status(&self, now: Instant) -> Option<StatusView> {
+        self.brain.as_ref().map(|brain| brain.status(self.clock.show(now)))
+    }
+
+    /// Whom it believes to hold the coordinator role, and under which term.
+    pub fn coordinator(&self) -> Option<(&RobotId, u64)> {
+        match self.brain.as_ref()?.mesh().fleet().get(RecordKind::ROLE, "")? {
+            (_, FleetValue::Role(role)) => Some((&role.holder, role.term)),
+            (_, _) => None,
+        }
+    }
+
+    /// Whether it believes that it is the coordinator itself.
+    pub fn is_coordinator(&self) -> bool {
+        self.coordinator().is_some_and(|(holder, _)| *holder == self.id)
+    }
+
+    /// Starts and ends of its agent so far: names one life of it.
+    pub fn life(&self) -> u64 {
+        self.life
+    }
+
+    /// When its agent started last.
+    pub fn on_since(&self) -> Instant {
+        self.on_since
+    }
+
+    /// Most effects of one input so far.
+    pub fn effects_max(&self) -> usize {
+        self.effects_max
+    }
+
+    /// Longest datagram so far, bytes.
+    pub fn datagram_bytes_max(&self) -> usize {
+        self.datagram_bytes_max
+    }
+
+    /// Its processes.
+    pub fn processes(&self) -> impl Iterator<Item = (&InstanceId, &Process)> {
+        self.processes.iter()
+    }
+
+    /// Its processes of a component.
+    pub(crate) fn instances_of(&self, word: &str) -> Vec<InstanceId> {
+        let of = self.processes.iter().filter(|(_, p)| p.component.name.as_str() == word);
+        of.map(|(id, _)| *id).collect()
+    }
+
+    /// What it measures of itself now.
+    pub(crate) fn measured(&self) -> HostReport {
+        let memory = self.processes.values().map(|process| process.needs.memory.0).sum();
+        let cpu = self.processes.values().map(|process| process.needs.cpu.0).sum();
+        HostReport {
+            memory_used: self.host.memory_used.plus(Bytes(memory)),
+            cpu_used: self.host.cpu_used.plus(Permille(cpu)),
+            ..self.host
+        }
+    }
+
+    /// Takes the wanted routes; the paths that changed.
+    pub(crate) fn take_routes(&mut self, routes: &[Route]) -> Vec<String> {
+        let (mut outs, mut ins) = (BTreeMap::new(), BTreeMap::new());
+        for route in routes {
+            match &route.direction {
+                Direction::Out { active } => {
+                    outs.insert(route.path.clone(), active.clone());
+                }
+                Direction::In => {
+                    ins.insert(route.path.clone(), ());
+                }
+            }
+        }
+        let mut changed: Vec<String> = outs
+            .iter()
+            .filter(|(path, token)| self.outs.get(*path) != Some(token))
+            .map(|(path, _)| path.clone())
+            .collect();
+        changed.extend(ins.keys().filter(|path| !self.ins.contains_key(*path)).cloned());
+        (self.outs, self.ins) = (outs, ins);
+        changed
+    }
+
+    /// Whether a process of this component is active here.
+    pub fn has_active(&self, word: &str) -> bool {
+        self.processes.values().any(|process| {
+            process.component.name.as_str() == word && process.state == LifecycleState::Active
+        })
+    }
+}
+
+/// A body that can launch `words`.
+pub(crate) fn body(memory: Bytes, cpu: Permille, words: &[&str]) -> RobotFacts {
+    let mut launchables: Vec<u32> =
+        words.iter().map(|word| sdr_core::spec::launch_hash(word)).collect();
+    launchables.sort_unstable();
+    RobotFacts {
+        memory_capacity: memory,
+        cpu_capacity: cpu,
+        labels: Vec::new(),
+        devices: Vec::new(),
+        launchables,
+        role: RolePreference::Able,
+        api: String::new(),
+        version: "simulated".into(),
+    }
+}

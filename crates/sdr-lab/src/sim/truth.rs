@@ -1,0 +1,164 @@
+//! What is so, whatever the robots believe: who can hear whom, who runs what.
+
+use std::time::Duration;
+
+use sdr_core::{
+    id::ComponentKey,
+    mesh::FleetTable,
+    order::hash64,
+    record::{FleetValue, RecordKind},
+    time::Instant,
+};
+
+use super::{air::Way, fleet::Fleet};
+
+impl Fleet {
+    /// Groups of robots that are on and can reach each other; a deaf robot is alone.
+    pub fn sides(&self) -> Vec<Vec<usize>> {
+        let mut sides: Vec<(Vec<bool>, Vec<usize>)> = Vec::new();
+        let mut alone = Vec::new();
+        for robot in (0..self.robots.len()).filter(|robot| self.robots[*robot].is_on()) {
+            if self.air.deaf_since(robot, self.now).is_some() {
+                alone.push(vec![robot]);
+                continue;
+            }
+            let place: Vec<bool> = self.air.cuts.iter().map(|cut| cut.inside[robot]).collect();
+            match sides.iter_mut().find(|(other, _)| *other == place) {
+                Some((_, members)) => members.push(robot),
+                None => sides.push((place, vec![robot])),
+            }
+        }
+        sides.into_iter().map(|(_, members)| members).chain(alone).collect()
+    }
+
+    /// Whether nothing but whole cuts has disturbed the fleet for `time`.
+    pub fn is_steady_for(&self, time: Duration) -> bool {
+        self.now >= self.steady_since + time
+            && self.air.cuts.iter().all(|cut| cut.way == Way::Both && self.now >= cut.since + time)
+    }
+
+    /// The last moment from which on everything was steady; may lie ahead.
+    pub fn steady_since(&self) -> Instant {
+        self.steady_since
+    }
+
+    /// Whether some robots are cut off from others now.
+    pub fn is_cut(&self) -> bool {
+        !self.air.cuts.is_empty()
+    }
+
+    /// How long the present separation of two robots lasts in all, from its beginning to its
+    /// end: deafness, cuts, agents that stand still. `None` when nothing is between them.
+    pub fn apart_for(&self, a: usize, b: usize) -> Option<Duration> {
+        let deaf = [a, b].into_iter().filter_map(|robot| self.air.deaf_for(robot, self.now));
+        let cuts = self.air.cuts.iter().filter(|cut| cut.inside[a] != cut.inside[b]);
+        let cuts = cuts.map(|cut| cut.until.since(cut.since));
+        let paused = [a, b].into_iter().map(|robot| &self.robots[robot]);
+        let paused = paused
+            .filter(|robot| self.now < robot.paused_until)
+            .map(|robot| robot.paused_until.since(robot.paused_at));
+        deaf.chain(cuts).chain(paused).max()
+    }
+
+    /// Whether a robot's radio was deaf at any time since then.
+    pub fn was_deaf_since(&self, robot: usize, since: Instant) -> bool {
+        self.air.was_deaf_since(robot, since)
+    }
+
+    /// The robot that believes itself coordinator under the greatest term.
+    pub fn highest_coordinator(&self) -> Option<usize> {
+        let holders = self.robots.iter().filter(|robot| robot.is_coordinator());
+        let term = |robot: &&super::Robot| robot.coordinator().map(|(id, term)| (term, id.clone()));
+        holders.max_by_key(term).map(|robot| robot.number)
+    }
+
+    /// Components that should run, as the tables of these robots say.
+    pub fn wanted(&self, robots: &[usize]) -> Vec<ComponentKey> {
+        let mut wanted: Vec<ComponentKey> = Vec::new();
+        // of a large fleet a few robots speak for all
+        let tables = robots.iter().take(SPEAKERS).filter_map(|robot| self.table(*robot));
+        // the table with the greatest revision of a system decides
+        let mut systems = std::collections::BTreeMap::new();
+        for table in tables {
+            for (key, version, value) in table.of_kind(RecordKind::SYSTEM) {
+                let FleetValue::System(system) = value else { continue };
+                let entry = systems.entry(key.name.clone()).or_insert((
+                    version.clone(),
+                    system.clone(),
+                    table,
+                ));
+                if *version > entry.0 {
+                    *entry = (version.clone(), system.clone(), table);
+                }
+            }
+        }
+        for (version, system, table) in systems.into_values() {
+            if !system.wanted {
+                continue;
+            }
+            let parts = table.of_kind(RecordKind::COMPONENT);
+            for (key, part, value) in parts {
+                let (FleetValue::Component(spec), Some((of, _))) =
+                    (value, key.name.split_once('/'))
+                else {
+                    continue;
+                };
+                if of == system.name.as_str() && part.revision == version.revision {
+                    wanted.push(ComponentKey::new(&system.name, &spec.name));
+                }
+            }
+        }
+        wanted
+    }
+
+    /// How many components were ever seen.
+    pub fn components(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Active processes of a component by number.
+    pub fn active_of(&self, component: usize) -> &[super::ActiveProcess] {
+        &self.actives[component]
+    }
+
+    /// A component that feeds this process and whose present token it has not accepted.
+    pub fn unheard(&self, process: &super::Process) -> Option<&ComponentKey> {
+        let deaf = process.inputs.iter().find(|(wiring, producer)| {
+            let [active] = self.actives[*producer].as_slice() else { return false };
+            process.heard.get(&wiring.connection) != Some(&active.token)
+        })?;
+        Some(&self.keys[deaf.1])
+    }
+
+    /// The fleet table of a robot that is on.
+    pub fn table(&self, robot: usize) -> Option<&FleetTable> {
+        self.robots[robot].brain().map(|brain| brain.mesh().fleet())
+    }
+}
+
+/// Robots whose tables are looked at for what is wanted.
+const SPEAKERS: usize = 12;
+
+/// Kinds of records that exist or may come.
+const KINDS: std::ops::RangeInclusive<u8> = 0..=31;
+
+/// Hash over a whole table: equal tables have equal ones.
+pub fn table_hash(table: &FleetTable) -> u64 {
+    let mut hash = 0_u64;
+    for kind in KINDS {
+        for (key, _, _) in table.of_kind(RecordKind(kind)) {
+            let Some(record) = table.record(key) else { continue };
+            let version = &record.version;
+            let epoch =
+                version.epoch.as_ref().map_or((0, ""), |e| (e.number, e.minted_by.as_str()));
+            let text = format!(
+                "{kind} {} {epoch:?} {} {} {}",
+                key.name, version.revision, version.term, version.author
+            );
+            hash = hash.rotate_left(7)
+                ^ hash64(text.as_bytes())
+                ^ hash64(&record.value).rotate_left(31);
+        }
+    }
+    hash
+}

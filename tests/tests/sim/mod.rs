@@ -1,0 +1,4 @@
+//! Whole fleets in virtual time, under everything that can go wrong.
+
+mod checkers;
+mod seeds;
