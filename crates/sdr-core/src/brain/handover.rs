@@ -54,7 +54,13 @@ impl Brain {
         let fresh =
             || Holding { term, compared_at: None, order: Vec::new(), better: None, offer: None };
         let held = self.desk_of_role.holding.take().filter(|holding| holding.term == term);
-        let mut holding = held.unwrap_or_else(fresh);
+        let mut holding = match held {
+            Some(holding) => holding,
+            None => {
+                self.say_taken(term);
+                fresh()
+            }
+        };
         let next = holding.compared_at.map(|at| at + COMPARE_EVERY);
         if next.is_none_or(|at| now >= at) {
             holding.compared_at = Some(now);
@@ -63,6 +69,19 @@ impl Brain {
         }
         self.wake_for_role(holding.compared_at.map_or(now, |at| at + COMPARE_EVERY));
         self.desk_of_role.holding = Some(holding);
+    }
+
+    /// It acts from here on: its term is on disk and in the table.
+    fn say_taken(&mut self, term: u64) {
+        let why = core::mem::take(&mut self.desk_of_role.why);
+        let by_operator = self.role().is_some_and(|role| role.by_operator);
+        let why = match (why.is_empty(), by_operator) {
+            (false, _) => why,
+            (true, true) => String::from("named by an operator"),
+            (true, false) => String::from("held it before"),
+        };
+        let event = Event::new("role-taken", &self.me, format!("term {term}, {why}"));
+        self.push_event(event.number("term", count(term)));
     }
 
     /// It does not hold the role, or not any more.

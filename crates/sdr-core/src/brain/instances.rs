@@ -67,6 +67,10 @@ impl Instance {
         }
     }
 
+    pub(super) fn is_told_to_act(&self) -> bool {
+        matches!(self.told, Told::Activate(_))
+    }
+
     pub(super) fn is_ending(&self) -> bool {
         self.told == Told::Finish
     }

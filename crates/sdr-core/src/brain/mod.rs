@@ -20,6 +20,7 @@ mod gone;
 mod handover;
 mod index;
 mod instances;
+mod isolation;
 mod judge;
 mod launch;
 mod minting;
@@ -42,6 +43,7 @@ mod tests;
 use alloc::{
     boxed::Box,
     collections::{BTreeMap, BTreeSet, VecDeque},
+    format,
     string::String,
     sync::Arc,
 };
@@ -62,6 +64,7 @@ use crate::{
 };
 use index::{Index, Stir};
 use instances::{Instance, RunBook};
+use isolation::Lease;
 use judge::{Engine, RestartPlan};
 use minting::Desk;
 use moves::MoveWatch;
@@ -129,6 +132,7 @@ pub struct Brain {
     left: BTreeMap<(ComponentKey, RobotId), Instant>,
     desk: Desk,
     desk_of_role: RoleDesk,
+    lease: Lease,
     duplicates_told: BTreeSet<core::net::SocketAddr>,
 }
 
@@ -197,6 +201,7 @@ impl Brain {
             left: BTreeMap::new(),
             desk: Desk::default(),
             desk_of_role: RoleDesk::default(),
+            lease: Lease::default(),
             duplicates_told: BTreeSet::new(),
         });
         brain.refresh_all_systems();
@@ -286,6 +291,7 @@ impl Brain {
             .chain(self.desk.retry_at())
             .chain(self.desk.store_at())
             .chain(self.desk_of_role.wake_at)
+            .chain(self.lease.wake_at)
             .chain((!self.began).then(|| self.begin_deadline()))
     }
 
@@ -299,6 +305,11 @@ impl Brain {
         &self.mesh
     }
 
+    /// Where the sent bytes of the mesh went.
+    pub fn mesh_traffic(&self) -> crate::mesh::MeshTraffic {
+        self.mesh.traffic()
+    }
+
     /// Counters of the mesh, for metrics.
     pub fn mesh_counters(&self) -> crate::mesh::MeshCounters {
         self.mesh.counters()
@@ -310,6 +321,9 @@ impl Brain {
         self.take_news(now);
         self.notice_time(now);
         self.consider_role(now);
+        if self.lease.wake_at.is_none_or(|at| now >= at) || self.stir.here {
+            self.keep_lease(now);
+        }
         // before anything is reconciled: what failed must not be started behind the ladder's back
         if self.judge_due || self.engines.values().any(|engine| engine.is_due(now)) {
             self.judge(now);
@@ -359,7 +373,7 @@ impl Brain {
                     changed.note(&key);
                 }
                 MeshNews::Alive(robot) => {
-                    let text = alloc::format!("{robot} is heard");
+                    let text = format!("{robot} is heard");
                     self.event("robot-alive", text);
                     if planted::is(Defect::RestartedByHeal) {
                         let ids: alloc::vec::Vec<InstanceId> =
@@ -369,11 +383,22 @@ impl Brain {
                     self.plans.retry_soon();
                     self.stir = Stir::ALL;
                 }
-                MeshNews::Quiet(_) | MeshNews::Isolated | MeshNews::Rejoined => {}
+                MeshNews::Quiet(robot) => {
+                    let text = format!("{robot} is quiet; it is asked, and others are");
+                    self.event("robot-quiet", text);
+                }
+                MeshNews::Isolated => {
+                    self.stir = Stir::ALL;
+                    self.event("isolated", "hears nobody; decides nothing for others");
+                }
+                MeshNews::Rejoined => {
+                    self.stir = Stir::ALL;
+                    self.event("rejoined", "hears others again");
+                }
                 MeshNews::Gone(robot) => self.note_gone(now, &robot),
                 MeshNews::DuplicateId(from) => {
                     if self.duplicates_told.len() < 16 && self.duplicates_told.insert(from) {
-                        let text = alloc::format!("{from} speaks under this robot's name");
+                        let text = format!("{from} speaks under this robot's name");
                         self.event("duplicate-robot-id", text);
                     }
                 }

@@ -79,6 +79,10 @@ impl Brain {
             self.finish(id);
             return;
         }
+        if !self.may_act(now, key) {
+            self.be_silent(now, id, key);
+            return;
+        }
         let fits = match &instance.told {
             Told::Activate(token) => token.epoch == *epoch,
             Told::Nothing | Told::Deactivate | Told::Finish => false,
@@ -86,6 +90,15 @@ impl Brain {
         let able = matches!(instance.state, LifecycleState::Inactive | LifecycleState::Active);
         if !fits && able && self.predecessors_active(key) {
             self.activate(id, key, epoch);
+        }
+    }
+
+    /// It is the home, and must not act while nobody hears it.
+    fn be_silent(&mut self, now: Instant, id: InstanceId, key: &ComponentKey) {
+        if self.instances[&id].is_told_to_act() {
+            self.instances.get_mut(&id).expect("listed by the caller").told = Told::Deactivate;
+            self.command(id, Command::Deactivate);
+            self.stop_isolated(now, key);
         }
     }
 

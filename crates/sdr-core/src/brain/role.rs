@@ -7,7 +7,6 @@ use alloc::{format, string::String, vec, vec::Vec};
 
 use super::{Brain, handover::Holding, takeover::Suspicion};
 use crate::{
-    event::Event,
     id::RobotId,
     mesh::FleetRecord,
     order::Version,
@@ -28,6 +27,8 @@ pub(super) struct RoleDesk {
     /// It holds the role and hears nobody.
     pub(super) suspended: bool,
     pub(super) wake_at: Option<Instant>,
+    /// Why this robot takes the role, until it is on disk and said.
+    pub(super) why: String,
 }
 
 impl Brain {
@@ -76,9 +77,7 @@ impl Brain {
             self.desk_of_role.suspicion = None;
             let me = self.me.clone();
             let record = self.role_record(&me, false);
-            let term = self.term() + 1;
-            let event = Event::new("role-taken", &self.me, format!("term {term}, {why}"));
-            self.push_event(event.number("term", count(term)));
+            self.desk_of_role.why = String::from(why);
             self.mint(vec![record], None);
         }
     }

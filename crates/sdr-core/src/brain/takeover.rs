@@ -106,7 +106,9 @@ impl Brain {
         if !self.has_witness() {
             return false;
         }
-        let Some(inquiry) = self.mesh.inquiry(holder) else {
+        let since = self.desk_of_role.suspicion.as_ref().map(|suspicion| suspicion.since);
+        let inquiry = self.mesh.inquiry(holder);
+        let Some(inquiry) = inquiry.filter(|one| since.is_some_and(|at| one.asked_at >= at)) else {
             self.mesh.ask_about(now, holder);
             return false;
         };
