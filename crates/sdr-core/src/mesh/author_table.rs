@@ -70,8 +70,9 @@ pub(super) enum Lookup {
 pub struct AuthorTable {
     seats: Vec<Author>,
     by_name: BTreeMap<RobotId, Seat>,
-    /// All ids, sorted: looked through for every beat.
-    by_id: Vec<(u32, Seat)>,
+    /// All ids, sorted, and the seat of each: looked through for every beat.
+    ids: Vec<u32>,
+    id_seats: Vec<Seat>,
     /// XOR over all ids.
     hash: u32,
     /// Own records that changed and wait for their release.
@@ -84,7 +85,8 @@ impl AuthorTable {
         Self {
             hash: author.id,
             by_name: BTreeMap::from([(me, Seat::OWN)]),
-            by_id: Vec::from([(author.id, Seat::OWN)]),
+            ids: Vec::from([author.id]),
+            id_seats: Vec::from([Seat::OWN]),
             seats: Vec::from([author]),
             staged: BTreeSet::new(),
         }
@@ -125,11 +127,9 @@ impl AuthorTable {
     /// Whom the id in a beat stands for.
     pub(super) fn lookup(&self, id: u32, wide: bool) -> Lookup {
         let low = cut(id, wide);
-        let first = self.by_id.partition_point(|(known, _)| *known < low);
-        let mut found =
-            self.by_id[first..].iter().take_while(|(known, _)| *known <= last_of(low, wide));
+        let mut found = self.ids(low, last_of(low, wide));
         match (found.next(), found.next()) {
-            (Some((_, seat)), None) => Lookup::One(*seat),
+            (Some((_, seat)), None) => Lookup::One(seat),
             (None, _) => Lookup::Unknown,
             (Some(_), Some(_)) => Lookup::Ambiguous,
         }
@@ -142,8 +142,23 @@ impl AuthorTable {
 
     /// All ids in a range, with their seats.
     pub(super) fn ids(&self, low: u32, high: u32) -> impl Iterator<Item = (u32, Seat)> {
-        let first = self.by_id.partition_point(|(known, _)| *known < low);
-        self.by_id[first..].iter().copied().take_while(move |(known, _)| *known <= high)
+        let first = self.place(low);
+        let ids = self.ids[first..].iter().copied();
+        ids.zip(self.id_seats[first..].iter().copied()).take_while(move |(id, _)| *id <= high)
+    }
+
+    /// Index of the first id that is not less than `id`. Ids are hashes, evenly spread: the
+    /// place is near where their share of all numbers says.
+    fn place(&self, id: u32) -> usize {
+        let guess = (u64::from(id) * self.ids.len() as u64) >> 32;
+        let mut place = usize::try_from(guess).unwrap_or(0);
+        while place > 0 && self.ids[place - 1] >= id {
+            place -= 1;
+        }
+        while place < self.ids.len() && self.ids[place] < id {
+            place += 1;
+        }
+        place
     }
 
     /// The seat of a robot under an incarnation; a new seat, or the old one emptied, when
@@ -225,14 +240,19 @@ impl AuthorTable {
 
     fn replace(&mut self, seat: Seat, author: Author) {
         let before = self.seats[seat.0].id;
-        self.by_id.retain(|entry| *entry != (before, seat));
+        let entry = self.ids.iter().zip(&self.id_seats).position(|(_, known)| *known == seat);
+        if let Some(place) = entry {
+            self.ids.remove(place);
+            self.id_seats.remove(place);
+        }
         self.hash ^= before ^ author.id;
         self.index(author.id, seat);
         self.seats[seat.0] = author;
     }
 
     fn index(&mut self, id: u32, seat: Seat) {
-        let place = self.by_id.partition_point(|entry| *entry < (id, seat));
-        self.by_id.insert(place, (id, seat));
+        let place = self.place(id);
+        self.ids.insert(place, id);
+        self.id_seats.insert(place, seat);
     }
 }

@@ -19,8 +19,8 @@ const DOUBT_SHARE: (u32, u32) = (13, 100);
 const JUDGE_STEP: Duration = Duration::from_millis(50);
 /// Weight of the past in the usual gap, samples.
 const GAPS_KEPT: u64 = 1024;
-/// The thresholds stretch by at most so much.
-const STRETCH_MAX: u64 = 40;
+/// Quiet begins at most so many times later than configured.
+const STRETCH_MAX: u32 = 40;
 
 /// One observer's judgement of one robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -275,14 +275,19 @@ impl Liveness {
         self.judge_at.into_iter().chain(deaf_at).min()
     }
 
-    /// The age at which a robot is quiet.
+    /// The age at which a robot is quiet: as configured, or longer where news usually takes
+    /// longer, by what was measured and by how many robots share how many beats.
     pub(super) fn quiet(&self) -> Duration {
-        self.stretched(self.quiet_base())
+        let turn = micros(self.period) * (self.living as u64 + 1) / super::BEATS_TOLD as u64;
+        let usual = (self.gap_deviation * 11 / 2).max(turn * 8);
+        let base = self.quiet_base();
+        Duration::from_micros(usual).clamp(base, base * STRETCH_MAX)
     }
 
-    /// The age at which a robot is gone.
+    /// The age at which a robot is gone: later by half as much again as quiet is. In between
+    /// it is asked directly.
     pub(super) fn gone(&self) -> Duration {
-        self.stretched(self.gone_after)
+        self.gone_after + (self.quiet() - self.quiet_base()) * 3 / 2
     }
 
     fn quiet_base(&self) -> Duration {
@@ -310,16 +315,6 @@ impl Liveness {
             _ if silence < self.gone() * 2 => now.min(self.heard_at + self.doubt_after()),
             _ => now,
         }
-    }
-
-    /// Thresholds grow with the usual gap between news: measured, and expected from how many
-    /// robots share how many beats.
-    fn stretched(&self, base: Duration) -> Duration {
-        let quiet = micros(self.quiet_base()).max(1);
-        let turn = micros(self.period) * (self.living as u64 + 1) / super::BEATS_TOLD as u64;
-        let wanted = (self.gap_deviation * 11 / 2).max(turn * 24 / 5);
-        let thousandths = (wanted.saturating_mul(1000) / quiet).clamp(1000, STRETCH_MAX * 1000);
-        base * u32::try_from(thousandths).unwrap_or(u32::MAX) / 1000
     }
 
     fn note_gap(&mut self, gap: Duration) {

@@ -172,6 +172,7 @@ impl Mesh {
             self.hold_round();
         }
         self.spread_due();
+        self.compare_on();
         self.beat_guards();
         self.judge();
     }
@@ -249,6 +250,7 @@ impl Mesh {
     pub fn next_deadline(&self) -> Instant {
         let others = self.liveness.next_deadline().into_iter();
         let others = others.chain(self.spread.next_deadline()).chain(self.guard.next_deadline());
+        let others = others.chain(self.repair.next_deadline());
         others.fold(self.round_at, Instant::min)
     }
 

@@ -105,7 +105,7 @@ impl Mesh {
             Section::News(news) => self.take_news(seat, news),
             Section::Roster(piece) => self.answer_roster(&piece, answer),
             Section::FleetNodes(nodes) => self.answer_nodes(&nodes, answer),
-            Section::FleetEntries(piece) => self.answer_entries(from, &piece, answer),
+            Section::FleetEntries(piece) => self.answer_entries(&piece, answer),
             Section::FleetWanted(keys) => self.answer_wanted(&keys, answer),
             Section::FleetNews(records) => self.take_fleet_news(from, records, answer),
             Section::FleetRecords(records) => self.take_records(from, records, answer),

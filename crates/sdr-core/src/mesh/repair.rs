@@ -37,6 +37,8 @@ const ROSTER_DOUBTS: u8 = 3;
 const STAMPS_TOLD_MAX: usize = 250;
 /// Fleet tables are compared only when this one did not change for so long.
 const CALM: Duration = Duration::from_millis(1200);
+/// A comparison goes on so long after the last records came.
+const PACE: Duration = Duration::from_millis(100);
 /// A comparison that does not go on for so long is given up.
 const STALLED: Duration = Duration::from_millis(400);
 /// Entries in one piece of the fleet table, 10 bytes each at most.
@@ -44,7 +46,7 @@ const PIECE_ENTRIES_MAX: usize = 100;
 /// A branch with at most so many records is told entry by entry.
 const BRANCH_ENTRIES_MAX: usize = 64;
 /// Pieces and nodes in one answer.
-const PIECES_MAX: usize = 8;
+const PIECES_MAX: usize = 4;
 /// Records asked for at once, so that an answer brings all of them.
 const WANTED_MAX: usize = 60;
 /// Repaired facts are sent on as news when they are at most so many.
@@ -61,7 +63,8 @@ struct Want {
 struct Session {
     with: SocketAddr,
     their_root: u32,
-    pending: usize,
+    /// Records came since the roots were compared last.
+    moved: bool,
     moved_at: Instant,
 }
 
@@ -86,9 +89,10 @@ impl Repair {
         }
     }
 
-    /// Records of this author came; what is still lacking will be seen again.
-    pub(super) fn unwant(&mut self, seat: Seat) {
-        self.wants.remove(&seat);
+    /// Records of this author came; what is still lacking will be seen again. Whether they
+    /// had been asked for.
+    pub(super) fn unwant(&mut self, seat: Seat) -> bool {
+        self.wants.remove(&seat).is_some_and(|want| want.tries > 0)
     }
 
     /// The fleet table has news.
@@ -102,6 +106,11 @@ impl Repair {
             self.corrected_at = Some(now);
         }
         may
+    }
+
+    pub(super) fn next_deadline(&self) -> Option<Instant> {
+        let session = self.session.filter(|session| session.moved);
+        session.map(|session| session.moved_at + PACE)
     }
 
     pub(super) fn tidy(&mut self, now: Instant) {
@@ -171,7 +180,7 @@ impl Mesh {
             self.repair.session = Some(Session {
                 with: from,
                 their_root: theirs.fleet,
-                pending: 0,
+                moved: false,
                 moved_at: self.clock,
             });
             answer.push(self.root_nodes());
@@ -260,18 +269,9 @@ impl Mesh {
     }
 
     /// Sends what the other lacks, asks for what is lacking here.
-    pub(super) fn answer_entries(
-        &mut self,
-        from: SocketAddr,
-        piece: &FleetEntries,
-        answer: &mut Vec<Section>,
-    ) {
+    pub(super) fn answer_entries(&self, piece: &FleetEntries, answer: &mut Vec<Section>) {
         let mut wanted = self.fleet.wanted_of(piece);
         wanted.truncate(WANTED_MAX);
-        if let Some(session) = self.repair.session.as_mut().filter(|session| session.with == from) {
-            session.pending += wanted.len();
-            session.moved_at = self.clock;
-        }
         if !wanted.is_empty() {
             answer.push(Section::FleetWanted(wanted));
         }
@@ -292,7 +292,6 @@ impl Mesh {
         records: Vec<FleetRecord>,
         answer: &mut Vec<Section>,
     ) {
-        let count = records.len();
         let fresh = self.merge(records, answer);
         self.traffic.caught_up += fresh.len() as u64;
         if fresh.len() <= SENT_ON_MAX && self.in_step {
@@ -303,14 +302,24 @@ impl Mesh {
         else {
             return;
         };
-        session.pending = session.pending.saturating_sub(count);
+        session.moved = true;
         session.moved_at = self.clock;
         if root == session.their_root {
             self.in_step = true;
             self.repair.session = None;
-        } else if session.pending == 0 {
-            answer.push(self.root_nodes());
         }
+    }
+
+    /// Goes on with a comparison that brought something.
+    pub(super) fn compare_on(&mut self) {
+        let now = self.clock;
+        let due = |session: &&mut Session| session.moved && now >= session.moved_at + PACE;
+        let Some(session) = self.repair.session.as_mut().filter(due) else { return };
+        session.moved = false;
+        session.moved_at = now;
+        let with = session.with;
+        let nodes = self.root_nodes();
+        self.send(with, vec![nodes]);
     }
 
     fn bounded(&self, records: &[FleetRecord]) -> Vec<Section> {

@@ -8,7 +8,7 @@ use alloc::{
 use core::{net::SocketAddr, time::Duration};
 
 use super::{
-    BEATS_TOLD, Beat, Beats, Mesh, Section, Standing, Summary,
+    AskStamps, BEATS_TOLD, Beat, Beats, Mesh, Section, Standing, Summary,
     author_table::{Lookup, Seat},
     wire::{beat_len, cut},
 };
@@ -30,6 +30,8 @@ const INTRODUCED_MAX: usize = 3;
 const INTRODUCTIONS: u8 = 3;
 /// New robots that wait to be told; the others are found by comparing.
 const NEWCOMERS_MAX: usize = 64;
+/// Robots without an address that are asked for in one round.
+const ADDRESSES_ASKED_MAX: usize = 4;
 /// Strays are tried again this often, unless nobody is heard.
 const STRAY_PERIOD: Duration = Duration::from_secs(4);
 /// A quiet robot is pinged at most so often.
@@ -141,9 +143,19 @@ impl Mesh {
         let mut sections = self.greeting(seat);
         let newcomers = self.told.next_newcomers();
         sections.extend(self.stamps_for(newcomers.into_iter()));
+        sections.extend(self.ask_addresses());
         sections.extend(self.next_asks());
         sections.extend(self.next_deltas());
         self.send(address, sections);
+    }
+
+    /// Asks where robots are that live and were never heard without a relay.
+    fn ask_addresses(&self) -> Option<Section> {
+        let lacking =
+            self.liveness.living().filter(|(seat, _)| self.peers.address(*seat).is_none());
+        let ids: Vec<u32> =
+            lacking.map(|(seat, _)| self.authors.at(seat).id).take(ADDRESSES_ASKED_MAX).collect();
+        (!ids.is_empty()).then_some(Section::AskStamps(AskStamps { wide: true, ids }))
     }
 
     /// Doubling strides in small fleets, where nearly all news passes in every datagram; by
@@ -220,7 +232,8 @@ impl Mesh {
         let again = alone || self.is_isolated() || due;
         let Some(address) = self.peers.next_stray(self.clock, again) else { return };
         self.told.strays_at = Some(self.clock);
-        let greeting = self.greeting(Seat::OWN);
+        let mut greeting = self.greeting(Seat::OWN);
+        greeting.push(Section::Ping);
         self.send(address, greeting);
     }
 

@@ -171,8 +171,10 @@ impl Mesh {
             self.repair.want(seat, self.clock);
         }
         if advanced {
-            self.repair.unwant(seat);
-            self.spread.ride(seat, before);
+            // what had to be asked for is no news to others
+            if !self.repair.unwant(seat) {
+                self.spread.ride(seat, before);
+            }
         }
         if learned.records {
             self.news.push_back(MeshNews::Report(delta.robot.clone()));
