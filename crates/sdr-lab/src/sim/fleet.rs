@@ -3,6 +3,8 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use sdr_core::{
+    api::DeployAnswer,
+    brain::BrainConfig,
     event::Event,
     id::{ComponentKey, Name, RobotId},
     input::{Input, InstanceId},
@@ -150,8 +152,11 @@ pub struct Fleet {
     pub(crate) steady_since: Instant,
     /// What brains said, when it is kept: when, who, what.
     pub told: Vec<(Instant, usize, Event)>,
+    /// Answers to operators, when they are kept: who, what.
+    pub answers: Vec<(usize, Result<DeployAnswer, String>)>,
     /// Faults that struck, in words, when they are kept.
     pub struck: Vec<(Instant, String)>,
+    gone_after: Duration,
     steps: u64,
 }
 
@@ -168,7 +173,10 @@ impl Fleet {
         });
         let robots: Vec<Robot> = robots.collect();
         let air = Air::new(setup.robots, setup.weather.clone(), Chance::stream(setup.seed, 2));
+        let first = &robots[0];
+        let config = BrainConfig::new(first.id.clone(), first.facts.clone());
         Self {
+            gone_after: config.gone_after,
             now: BEGIN,
             tally: Tally::new(robots.len()),
             robots,
@@ -187,6 +195,7 @@ impl Fleet {
             cuts: 0,
             steady_since: BEGIN,
             told: Vec::new(),
+            answers: Vec::new(),
             struck: Vec::new(),
             steps: 0,
             setup,
@@ -279,6 +288,11 @@ impl Fleet {
     /// Whether what a robot stores is kept for its next start.
     pub fn keep_disk(&mut self, robot: usize, keep: bool) {
         self.robots[robot].disk.is_read = keep;
+    }
+
+    /// Silence after which a robot counts as gone, as brains have it by default.
+    pub fn gone_after(&self) -> Duration {
+        self.gone_after
     }
 
     /// Deploys on a robot; nothing happens while it is off.

@@ -1,4 +1,18 @@
-//! The simulator.
+//! The simulator: the very brains of the agents in virtual time, on one thread.
+//!
+//! ```text
+//!  Scenario (drawn) ─┐  faults, operators
+//!  Plain (figures) ──┴─▶ Run ─▶ Fleet ── handle / poll_effect ──▶ Brain of each robot
+//!                         │       ├─ Queue: what is due, by (time, sequence)
+//!                         │       ├─ Air: loss, delay, cuts     ├─ Disk, Clock, Process
+//!                         │       └─ Sight: what truly happened
+//!                         ├─▶ Watch: checkers, one rule each, which only look ─▶ violations
+//!                         └─▶ Measure ─▶ Record ─▶ Figures
+//! ```
+//!
+//! One seed draws everything; nothing here reads a clock but [`Record::real_s`]. Equal seeds
+//! give equal traces. `docs/simulator.md` says what is drawn, what is checked and how each
+//! figure is defined.
 
 mod air;
 mod chance;
@@ -26,6 +40,7 @@ mod tally;
 mod trace;
 mod truth;
 mod watch;
+mod words;
 
 pub use air::{FRAME_BYTES, Way, Weather, address};
 pub use chance::Chance;
@@ -39,6 +54,7 @@ pub use record::{Figures, Rate, Record, Spread};
 pub use robot::Robot;
 pub use shrink::{Shrunk, fair_weather, shrink};
 pub use sight::Sight;
+pub use story::story;
 pub use tally::Tally;
 pub use truth::table_hash;
 pub use watch::{Broken, Checker, Violation, Watch};

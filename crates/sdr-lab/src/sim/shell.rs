@@ -45,6 +45,9 @@ impl Fleet {
                     self.later(number, SOON, Input::Planned { plan, result });
                 }
                 Effect::Answer { result, .. } => {
+                    if self.setup.keeps_events {
+                        self.answers.push((number, result.clone()));
+                    }
                     self.sights.push(Sight::Answered { robot: number, answer: result });
                 }
                 Effect::Event(event) => {
@@ -269,10 +272,8 @@ impl Fleet {
         let due = Due::Sample { robot: number, life: robot.life };
         self.queue.push(self.now + self.setup.host_period, due);
         let host = robot.measured();
-        let usage =
-            |process: &Process| Usage { memory: process.needs.memory, cpu: process.needs.cpu };
         let figures: Vec<(InstanceId, Usage)> =
-            robot.processes.iter().map(|(id, process)| (*id, usage(process))).collect();
+            robot.processes.iter().map(|(id, process)| (*id, robot.usage(process))).collect();
         if !figures.is_empty() {
             self.tell(number, Input::Usage(figures));
         }
