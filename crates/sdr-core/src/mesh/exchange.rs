@@ -169,6 +169,11 @@ impl Mesh {
     }
 
     fn learn(&mut self, now: Instant, delta: &AuthorDelta, answer: &mut Vec<Section>) -> bool {
+        if planted::is(Defect::StaleReports)
+            && self.authors.robots().any(|r| *r == delta.stamp.robot)
+        {
+            return false;
+        }
         let learned = self.authors.learn(delta);
         self.counters.refused += learned.refused;
         if learned.fresh {

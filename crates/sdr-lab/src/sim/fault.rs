@@ -6,7 +6,8 @@ use sdr_core::{spec::SystemSpec, time::Instant, units::Dbm};
 
 use super::{
     air::{Cut, Way, Weather},
-    fleet::{Due, Fleet, Over, Turn},
+    due::{Due, Over, Turn},
+    fleet::Fleet,
     process::Behaviour,
     sight::Sight,
 };

@@ -13,7 +13,8 @@ use sdr_core::{
 use super::{
     air::{FRAME_BYTES, number_of},
     disk::Order,
-    fleet::{ActiveProcess, Due, Fleet, Turn},
+    due::{Due, Turn},
+    fleet::{ActiveProcess, Fleet},
     process::{Behaviour, Process},
     sight::Sight,
 };
