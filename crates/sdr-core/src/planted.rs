@@ -38,11 +38,23 @@ pub enum Defect {
     RestartedByHeal,
     /// News of others is passed on to everybody, again and again.
     EndlessEcho,
+    /// The old home of a planned move never ends.
+    DrainForever,
+    /// A process of an old edition of its component goes on.
+    OldEditionRuns,
+    /// What robots say of themselves is never updated.
+    StaleReports,
+    /// Homes are not written to disk.
+    HomesNotStored,
+    /// Samples of the home are not forwarded to other robots.
+    SilentRoute,
+    /// A write that failed counts as done.
+    DiskErrorIgnored,
 }
 
 impl Defect {
     /// All of them.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 22] = [
         Self::NoEpochCheck,
         Self::WireBeforeDisk,
         Self::TermNotStored,
@@ -59,6 +71,12 @@ impl Defect {
         Self::SystemNotStored,
         Self::RestartedByHeal,
         Self::EndlessEcho,
+        Self::DrainForever,
+        Self::OldEditionRuns,
+        Self::StaleReports,
+        Self::HomesNotStored,
+        Self::SilentRoute,
+        Self::DiskErrorIgnored,
     ];
 }
 

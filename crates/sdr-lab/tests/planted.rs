@@ -29,7 +29,10 @@ fn caught(seeds: &[u64]) -> Option<(u64, String)> {
     };
     std::thread::scope(|scope| {
         let workers: Vec<_> = (0..THREADS).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().filter_map(|worker| worker.join().unwrap()).min()
+        workers
+            .into_iter()
+            .filter_map(|worker| worker.join().expect("no run panics past its net"))
+            .min()
     })
 }
 

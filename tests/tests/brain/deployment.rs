@@ -28,7 +28,7 @@ fn the_papers_system_spreads_over_three_robots_as_in_figure_3() {
     let fleet = deployed(1);
 
     assert_eq!(homes(&fleet), ["robot-1", "robot-1", "robot-2", "robot-2", "robot-3"]);
-    assert!(matches!(&fleet.robots[0].answers[..], [Ok(answer)] if answer.revision == 1));
+    assert!(matches!(&fleet.answers_of(0)[..], [Ok(answer)] if answer.revision == 1));
     for component in &fleet.status().systems[0].components {
         assert_eq!((component.epoch, component.state), (1, Some(LifecycleState::Active)));
     }
@@ -78,7 +78,7 @@ fn deploying_the_same_again_changes_nothing() {
     fleet.deploy(1, &exploration());
     fleet.run(Duration::from_secs(3));
 
-    assert!(matches!(&fleet.robots[1].answers[..], [Ok(answer)] if !answer.changed));
+    assert!(matches!(&fleet.answers_of(1)[..], [Ok(answer)] if !answer.changed));
     let launches: usize = fleet.robots.iter().map(|robot| robot.launches).sum();
     assert_eq!(launches, 5);
 }
@@ -119,8 +119,8 @@ fn what_fits_nowhere_is_refused_by_robot_number_and_bar_and_placed_once_it_fits(
     fleet.run(Duration::from_secs(2));
 
     let worker = fleet.component("alone", "worker").unwrap();
-    let coordinator = fleet.robots.iter().find(|robot| robot.is_coordinator(fleet.now)).unwrap();
-    let status = coordinator.status(fleet.now);
+    let coordinator = fleet.robots.iter().find(|robot| robot.is_coordinator()).unwrap();
+    let status = coordinator.status(fleet.now).unwrap();
     let refusals = &status.systems[0].components[0].refusals;
     assert_eq!((worker.home, refusals.len()), (None, 2), "{}", fleet.story());
     assert!(refusals.iter().all(|refusal| refusal.constraint == "memory_free"));
@@ -149,13 +149,13 @@ fn a_component_waits_for_those_before_it() {
 fn a_robot_that_cannot_store_refuses_and_says_so() {
     let mut fleet = Fleet::new(1, 9);
     fleet.run(Duration::from_secs(3));
-    fleet.robots[0].disk_broken = true;
+    fleet.robots[0].fill_disk(true);
     fleet.deploy(0, &single(100));
     fleet.run(Duration::from_secs(2));
-    assert!(fleet.robots[0].answers[0].as_ref().unwrap_err().contains("no space left"));
+    assert!(fleet.answers_of(0)[0].as_ref().unwrap_err().contains("no space left"));
     assert!(!fleet.events("minting-paused").is_empty());
 
-    fleet.robots[0].disk_broken = false;
+    fleet.robots[0].fill_disk(false);
     fleet.run(Duration::from_secs(3));
     fleet.deploy(0, &single(100));
     fleet.run_until(LONG, "active", |fleet| fleet.is_running("alone"));

@@ -10,7 +10,7 @@ const LONG: Duration = Duration::from_secs(30);
 fn coordinators(fleet: &Fleet) -> Vec<String> {
     let on = fleet.robots.iter().filter(|robot| robot.is_on());
     let mut names: Vec<String> =
-        on.filter_map(|robot| robot.status(fleet.now).coordinator).collect();
+        on.filter_map(|robot| robot.status(fleet.now)?.coordinator).collect();
     names.dedup();
     names
 }
@@ -65,6 +65,6 @@ fn a_lonely_robot_of_three_mints_no_term() {
     fleet.run(Duration::from_secs(3));
     fleet.split(2);
     fleet.run(Duration::from_secs(30));
-    let lonely = fleet.robots[2].status(fleet.now);
+    let lonely = fleet.status_of(2);
     assert_eq!((lonely.coordinator.as_deref(), lonely.term), (Some("robot-1"), 1));
 }

@@ -125,6 +125,7 @@ impl Brain {
         let mut fleet: Vec<StoredRecord> = fleet.to_stored();
         fleet.retain(|record| match record.key.kind {
             RecordKind::ROLE => !planted::is(Defect::TermNotStored),
+            RecordKind::ASSIGNMENT if planted::is(Defect::HomesNotStored) => false,
             _ => !planted::is(Defect::SystemNotStored),
         });
         let state = StoredState {
@@ -162,6 +163,9 @@ impl Brain {
 
     /// Keeps running, mints nothing, says so.
     pub(super) fn handle_store_failed(&mut self, ticket: StoreTicket, reason: &str) {
+        if planted::is(Defect::DiskErrorIgnored) {
+            return self.handle_stored(ticket);
+        }
         self.desk.spoken = true;
         self.desk.broken_at = Some(self.handled_at);
         if self.desk.in_flight == Some(ticket) {

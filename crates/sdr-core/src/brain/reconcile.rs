@@ -74,7 +74,8 @@ impl Brain {
         };
         let shape = self.shape(key);
         let instance = &self.instances[&id];
-        if shape.is_some_and(|shape| shape != instance.shape) {
+        let old = shape.is_some_and(|shape| shape != instance.shape);
+        if old && !planted::is(Defect::OldEditionRuns) {
             self.event_about("respecified", key, "its spec or wiring changed");
             self.finish(id);
             return;
@@ -132,7 +133,7 @@ impl Brain {
         let Some(id) = self.current(key) else { return };
         let since = *self.drains.entry(key.clone()).or_insert(now);
         let late = now >= since + self.config.drain_max;
-        if late || self.switched(key, epoch) {
+        if (late || self.switched(key, epoch)) && !planted::is(Defect::DrainForever) {
             let reason = match late {
                 true => format!("drained for {} ms", now.since(since).as_millis()),
                 false => "the new home is active and heard".into(),

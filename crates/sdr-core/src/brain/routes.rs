@@ -7,6 +7,7 @@ use crate::{
     effect::{Direction, Effect, Route},
     id::{ComponentKey, Name, RobotId},
     order::Token,
+    planted::{self, Defect},
     spec::{ConnectionSpec, Qos, Reliability, port_path},
 };
 
@@ -79,6 +80,7 @@ impl Brain {
     /// it drains.
     fn forwarded(&self, key: &ComponentKey) -> Option<Token> {
         match self.duty(key) {
+            Duty::Home(_) | Duty::Drain(_) if planted::is(Defect::SilentRoute) => None,
             Duty::Home(_) | Duty::Drain(_) => {
                 let id = self.current(key)?;
                 match &self.instances[&id].told {

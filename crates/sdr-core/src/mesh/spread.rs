@@ -164,6 +164,9 @@ impl Mesh {
         let Some(seat) = admission.seat() else { return };
         let author = self.authors.at_mut(seat);
         let before = author.sequence();
+        if before > 0 && planted::is(Defect::StaleReports) {
+            return;
+        }
         let learned = author.learn(delta);
         let advanced = author.sequence() > before;
         self.counters.refused += learned.refused;

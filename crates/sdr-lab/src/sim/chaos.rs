@@ -61,7 +61,7 @@ impl Scenario {
         }
         let story = match telling {
             Telling::Silent => Vec::new(),
-            Telling::Whole => story::lines(&run.fleet),
+            Telling::Whole => story(&run.fleet),
         };
         Outcome { record: run.finish(), story }
     }

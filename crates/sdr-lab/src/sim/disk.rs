@@ -64,11 +64,8 @@ impl Disk {
     pub(crate) fn crash(&mut self, written: Written) {
         self.waiting = None;
         let under_way = self.writing.take();
-        match written {
-            Written::Whole if !self.full => {
-                self.held = under_way.map(|o| o.state).or(self.held.take())
-            }
-            Written::Whole | Written::NotAtAll => {}
+        if written == Written::Whole && !self.full && under_way.is_some() {
+            self.held = under_way.map(|order| order.state);
         }
     }
 

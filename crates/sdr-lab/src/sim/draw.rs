@@ -230,7 +230,7 @@ impl Draw {
 
 /// One edition of a small system.
 fn edition(number: usize, edition: usize) -> SystemSpec {
-    let memory = if edition % 2 == 0 { 40 } else { 60 };
+    let memory = if edition.is_multiple_of(2) { 40 } else { 60 };
     let needs = sdr_core::spec::Needs { memory: Bytes::mega(memory), cpu: Permille(50) };
     let components = 2 + edition % 3;
     let mut system = systems::chain(systems::name("system", number), components, needs);

@@ -1,12 +1,13 @@
 //! What can go wrong, and what operators do meanwhile.
 
-use std::{fmt, time::Duration};
+use std::time::Duration;
 
 use sdr_core::{spec::SystemSpec, time::Instant, units::Dbm};
 
 use super::{
     air::{Cut, Way, Weather},
-    fleet::{Due, Fleet, Over, Turn},
+    due::{Due, Over, Turn},
+    fleet::Fleet,
     process::Behaviour,
     sight::Sight,
 };
@@ -191,6 +192,14 @@ impl Fleet {
         self.queue.push(until, Due::Over(Over::Cut(self.cuts)));
     }
 
+    /// All walls fall.
+    pub fn heal(&mut self) {
+        self.air.cuts.clear();
+        self.sights.push(Sight::Healed);
+        (0..self.robots.len()).for_each(|robot| self.flow_at(robot));
+        self.disturb(self.now);
+    }
+
     /// All walls fall, all radios hear, all disks work, all robots that should are on: the
     /// end of the faults.
     pub fn calm(&mut self) {
@@ -249,108 +258,4 @@ impl Fleet {
         let level = self.air.level_dbm(robot)?;
         Some(Dbm::from_tenths(i16::try_from(crate::cast::rounded(level * 10.0)).unwrap_or(-1100)))
     }
-}
-
-fn seconds(time: &Duration) -> String {
-    format!("{:.1} s", time.as_secs_f64())
-}
-
-fn name(robot: &usize) -> String {
-    format!("robot-{}", robot + 1)
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Crash { robot, down, disk } => {
-                let disk = match disk {
-                    DiskFate::Kept => "disk kept",
-                    DiskFate::Lost => "disk lost",
-                };
-                let back = match down {
-                    Some(down) => format!("back after {}", seconds(down)),
-                    None => "for good".into(),
-                };
-                write!(f, "{} loses power, {disk}, {back}", name(robot))
-            }
-            Self::CrashAtStore { robot, down } => {
-                write!(
-                    f,
-                    "{} loses power in its next write, back after {}",
-                    name(robot),
-                    seconds(down)
-                )
-            }
-            Self::Pause { robot, time, clock } => {
-                let what = match clock {
-                    ClockFate::Runs => "agent stands still",
-                    ClockFate::Sleeps => "agent and clock stand still",
-                };
-                write!(f, "{}: {what} for {}", name(robot), seconds(time))
-            }
-            Self::Deaf { robot, time } => {
-                write!(f, "{} is deaf for {}", name(robot), seconds(time))
-            }
-            Self::Storm { loss, time } => {
-                write!(f, "{:.0} % of all datagrams are lost for {}", loss * 100.0, seconds(time))
-            }
-            Self::Cut { inside, way, time } => {
-                let inside: Vec<String> = inside.iter().map(name).collect();
-                let way = match way {
-                    Way::Both => "cut off",
-                    Way::Out => "not heard by the others",
-                };
-                write!(f, "{} {way} for {}", inside.join(", "), seconds(time))
-            }
-            Self::CutOffCoordinator { time } => {
-                write!(f, "the coordinator is cut off for {}", seconds(time))
-            }
-            Self::DiskFull { robot, time } => {
-                write!(f, "{}: disk full for {}", name(robot), seconds(time))
-            }
-            Self::DiskSlow { robot, each, time } => write!(
-                f,
-                "{}: each write takes {} ms, for {}",
-                name(robot),
-                each.as_millis(),
-                seconds(time)
-            ),
-            Self::Exit { component } => write!(f, "all processes of {component} are killed"),
-            Self::Hang { component } => write!(f, "all processes of {component} hang"),
-            Self::Behave { robot, component, behaviour, time } => {
-                write!(
-                    f,
-                    "{component} on {} for {}: {}",
-                    name(robot),
-                    seconds(time),
-                    ways(behaviour)
-                )
-            }
-            Self::Fade { robot, level_dbm, time } => {
-                write!(f, "{} measures {level_dbm} dBm for {}", name(robot), seconds(time))
-            }
-            Self::Deploy { robot, system } => {
-                let count = system.components.len();
-                write!(f, "{} is told to deploy {}, {count} components", name(robot), system.name)
-            }
-            Self::Undeploy { robot, system } => {
-                write!(f, "{} is told to undeploy {system}", name(robot))
-            }
-        }
-    }
-}
-
-fn ways(behaviour: &Behaviour) -> String {
-    let mut ways = Vec::new();
-    if behaviour.unstartable {
-        ways.push("cannot be started".into());
-    }
-    if let Some(after) = behaviour.crash_after {
-        ways.push(format!("ends {} ms after it became active", after.as_millis()));
-    }
-    if let Some((after, cause)) = behaviour.fail_after {
-        ways.push(format!("{cause} {} ms after it became active", after.as_millis()));
-    }
-    ways.push(format!("comes up in {} ms", behaviour.initialise.as_millis()));
-    ways.join(", ")
 }

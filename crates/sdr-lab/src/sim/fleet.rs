@@ -3,23 +3,25 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use sdr_core::{
+    api::DeployAnswer,
+    brain::BrainConfig,
     event::Event,
     id::{ComponentKey, Name, RobotId},
     input::{Input, InstanceId},
     order::Token,
     spec::SystemSpec,
     time::Instant,
-    units::{Bytes, Permille},
 };
 
 use super::{
-    air::{Air, Weather},
+    air::Air,
     chance::Chance,
     disk::Written,
-    fault::Fault,
+    due::Due,
     process::Process,
     queue::Queue,
     robot::{Robot, body},
+    setup::Setup,
     sight::Sight,
     tally::Tally,
     trace::Trace,
@@ -31,86 +33,6 @@ const TIMER_MIN: Duration = Duration::from_micros(100);
 const BACKLOG_MAX: usize = 256;
 /// The first moment; before it there is nothing.
 pub(crate) const BEGIN: Instant = Instant::from_millis(1000);
-
-/// How to set up a fleet.
-#[derive(Debug, Clone)]
-pub struct Setup {
-    /// How many robots.
-    pub robots: usize,
-    /// Draws everything that is left to chance.
-    pub seed: u64,
-    /// The radio.
-    pub weather: Weather,
-    /// Memory of each robot.
-    pub memory: Bytes,
-    /// CPU of each robot.
-    pub cpu: Permille,
-    /// Executables each robot can launch.
-    pub words: Vec<String>,
-    /// Time between two host samples of a robot; default 1 s.
-    pub host_period: Duration,
-    /// Clocks run fast or slow by at most so many millionths.
-    pub drift_ppm_max: usize,
-    /// Whether what brains say is kept for stories.
-    pub keeps_events: bool,
-}
-
-impl Setup {
-    /// Robots of 1.9 GB and 4 cores on a fair radio, with perfect clocks.
-    pub fn new(robots: usize, seed: u64) -> Self {
-        Self {
-            robots,
-            seed,
-            weather: Weather::fair(),
-            memory: Bytes::mega(1900),
-            cpu: Permille(4000),
-            words: vec!["worker".into()],
-            host_period: Duration::from_secs(1),
-            drift_ppm_max: 0,
-            keeps_events: false,
-        }
-    }
-}
-
-/// Something due.
-#[derive(Debug)]
-pub(crate) enum Due {
-    Wake { robot: usize },
-    Datagram { to: usize, from: usize, bytes: Vec<u8> },
-    Input { robot: usize, life: u64, input: Input },
-    Turn { robot: usize, life: u64, instance: InstanceId, turn: Turn },
-    Stored { robot: usize, life: u64 },
-    Crash { robot: usize, life: u64, down: Option<Duration> },
-    Start { robot: usize },
-    Sample { robot: usize, life: u64 },
-    Flow { component: usize },
-    Fault(Fault),
-    Over(Over),
-}
-
-/// What a process does by itself or as told.
-#[derive(Debug, Clone)]
-pub(crate) enum Turn {
-    Started,
-    Idle,
-    Active(Token),
-    Error(sdr_core::recover::Cause),
-    Exit(&'static str),
-    Hang,
-    Seen,
-}
-
-/// The end of a fault.
-#[derive(Debug, Clone)]
-pub(crate) enum Over {
-    Deaf(usize),
-    Cut(u64),
-    DiskFull(usize),
-    DiskSlow(usize),
-    Storm(Weather),
-    Behaviour(usize, String),
-    Fade(usize),
-}
 
 /// An active process.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -150,8 +72,11 @@ pub struct Fleet {
     pub(crate) steady_since: Instant,
     /// What brains said, when it is kept: when, who, what.
     pub told: Vec<(Instant, usize, Event)>,
+    /// Answers to operators, when they are kept: who, what.
+    pub answers: Vec<(usize, Result<DeployAnswer, String>)>,
     /// Faults that struck, in words, when they are kept.
     pub struck: Vec<(Instant, String)>,
+    gone_after: Duration,
     steps: u64,
 }
 
@@ -168,7 +93,10 @@ impl Fleet {
         });
         let robots: Vec<Robot> = robots.collect();
         let air = Air::new(setup.robots, setup.weather.clone(), Chance::stream(setup.seed, 2));
+        let first = &robots[0];
+        let config = BrainConfig::new(first.id.clone(), first.facts.clone());
         Self {
+            gone_after: config.gone_after,
             now: BEGIN,
             tally: Tally::new(robots.len()),
             robots,
@@ -187,6 +115,7 @@ impl Fleet {
             cuts: 0,
             steady_since: BEGIN,
             told: Vec::new(),
+            answers: Vec::new(),
             struck: Vec::new(),
             steps: 0,
             setup,
@@ -279,6 +208,11 @@ impl Fleet {
     /// Whether what a robot stores is kept for its next start.
     pub fn keep_disk(&mut self, robot: usize, keep: bool) {
         self.robots[robot].disk.is_read = keep;
+    }
+
+    /// Silence after which a robot counts as gone, as brains have it by default.
+    pub fn gone_after(&self) -> Duration {
+        self.gone_after
     }
 
     /// Deploys on a robot; nothing happens while it is off.

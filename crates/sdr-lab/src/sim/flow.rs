@@ -10,7 +10,8 @@ use sdr_core::{
 };
 
 use super::{
-    fleet::{ActiveProcess, Due, Fleet},
+    due::Due,
+    fleet::{ActiveProcess, Fleet},
     process::Offered,
     sight::Sight,
 };

@@ -9,9 +9,6 @@ use sdr_core::{
 
 use super::{Fleet, Record, Sight, check::convergence, table_hash};
 
-/// Silence after which an observer may rightly say "gone", at the default.
-const GONE_AFTER: Duration = Duration::from_secs(10);
-
 /// A robot that was killed on purpose.
 #[derive(Debug)]
 struct Kill {
@@ -69,10 +66,11 @@ impl Measure {
     }
 
     pub(crate) fn see(&mut self, fleet: &Fleet, sight: &Sight) {
-        match sight {
-            Sight::Told { robot, event } => self.told(fleet, *robot, event),
-            Sight::Look => self.look(fleet),
-            _ => {}
+        if let Sight::Told { robot, event } = sight {
+            self.told(fleet, *robot, event);
+        }
+        if matches!(sight, Sight::Look) {
+            self.look(fleet);
         }
     }
 
@@ -159,11 +157,13 @@ impl Measure {
     /// Whether a robot has been up, reachable and without trouble for a while.
     fn was_well(&self, fleet: &Fleet, robot: usize) -> bool {
         let up = fleet.robots[robot].is_on()
-            && fleet.now.since(fleet.robots[robot].on_since()) >= GONE_AFTER;
+            && fleet.now.since(fleet.robots[robot].on_since()) >= fleet.gone_after();
         let apart = (0..fleet.robots.len()).filter_map(|other| fleet.apart_for(robot, other)).max();
-        let troubled =
-            self.troubled.get(&robot).is_some_and(|at| fleet.now.since(*at) < GONE_AFTER * 6);
-        up && apart.is_none_or(|apart| apart < GONE_AFTER) && !troubled
+        let troubled = self
+            .troubled
+            .get(&robot)
+            .is_some_and(|at| fleet.now.since(*at) < fleet.gone_after() * 6);
+        up && apart.is_none_or(|apart| apart < fleet.gone_after()) && !troubled
     }
 
     /// Whether everything runs as it should; why not.
@@ -177,8 +177,8 @@ impl Measure {
 /// anything did, is shorter than that from its beginning to its end.
 fn is_false(fleet: &Fleet, observer: usize, target: usize) -> bool {
     let robot = &fleet.robots[target];
-    let up = robot.is_on() && fleet.now.since(robot.on_since()) >= GONE_AFTER;
-    up && fleet.apart_for(observer, target).is_none_or(|apart| apart < GONE_AFTER)
+    let up = robot.is_on() && fleet.now.since(robot.on_since()) >= fleet.gone_after();
+    up && fleet.apart_for(observer, target).is_none_or(|apart| apart < fleet.gone_after())
 }
 
 fn bytes_of(fleet: &Fleet, robot: usize) -> u64 {

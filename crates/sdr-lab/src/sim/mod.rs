@@ -1,4 +1,18 @@
-//! The simulator.
+//! The simulator: the very brains of the agents in virtual time, on one thread.
+//!
+//! ```text
+//!  Scenario (drawn) ─┐  faults, operators
+//!  Plain (figures) ──┴─▶ Run ─▶ Fleet ── handle / poll_effect ──▶ Brain of each robot
+//!                         │       ├─ Queue: what is due, by (time, sequence)
+//!                         │       ├─ Air: loss, delay, cuts     ├─ Disk, Clock, Process
+//!                         │       └─ Sight: what truly happened
+//!                         ├─▶ Watch: checkers, one rule each, which only look ─▶ violations
+//!                         └─▶ Measure ─▶ Record ─▶ Figures
+//! ```
+//!
+//! One seed draws everything; nothing here reads a clock but [`Record::real_s`]. Equal seeds
+//! give equal traces. `docs/simulator.md` says what is drawn, what is checked and how each
+//! figure is defined.
 
 mod air;
 mod chance;
@@ -7,6 +21,7 @@ pub mod check;
 mod clock;
 mod disk;
 mod draw;
+mod due;
 mod fault;
 mod fleet;
 mod flow;
@@ -17,6 +32,7 @@ mod queue;
 mod record;
 mod robot;
 mod run;
+mod setup;
 mod shell;
 mod shrink;
 mod sight;
@@ -26,19 +42,22 @@ mod tally;
 mod trace;
 mod truth;
 mod watch;
+mod words;
 
 pub use air::{FRAME_BYTES, Way, Weather, address};
 pub use chance::Chance;
 pub use chaos::{CONVERGED_WITHIN, Outcome, Telling};
 pub use draw::Scenario;
 pub use fault::{ClockFate, DiskFate, Fault, Incident};
-pub use fleet::{ActiveProcess, Fleet, Setup};
+pub use fleet::{ActiveProcess, Fleet};
 pub use plain::Plain;
 pub use process::{Behaviour, Process};
 pub use record::{Figures, Rate, Record, Spread};
 pub use robot::Robot;
+pub use setup::Setup;
 pub use shrink::{Shrunk, fair_weather, shrink};
 pub use sight::Sight;
+pub use story::story;
 pub use tally::Tally;
 pub use truth::table_hash;
 pub use watch::{Broken, Checker, Violation, Watch};

@@ -11,7 +11,7 @@ use sdr_core::{
     lifecycle::LifecycleState,
     order::Token,
     record::{FleetValue, RecordKind},
-    report::{HostReport, RobotFacts, RolePreference},
+    report::{HostReport, RobotFacts, RolePreference, Usage},
     time::Instant,
     units::{Bytes, Permille},
 };
@@ -34,6 +34,8 @@ pub struct Robot {
     pub host: HostReport,
     /// Its body and limits.
     pub facts: RobotFacts,
+    /// What each of its processes takes; what it declared when `None`.
+    pub takes: Option<Usage>,
     /// How processes of a component (by name) behave here; as usual when absent.
     pub behaviours: BTreeMap<String, Behaviour>,
     /// Starts of processes so far.
@@ -70,6 +72,7 @@ impl Robot {
             id: RobotId::new(&format!("robot-{}", number + 1)).expect("a number makes a name"),
             host: HostReport { memory_used: AGENT_MEMORY, ..HostReport::default() },
             facts,
+            takes: None,
             behaviours: BTreeMap::new(),
             launches: 0,
             number,
@@ -182,13 +185,29 @@ impl Robot {
 
     /// What it measures of itself now.
     pub(crate) fn measured(&self) -> HostReport {
-        let memory = self.processes.values().map(|process| process.needs.memory.0).sum();
-        let cpu = self.processes.values().map(|process| process.needs.cpu.0).sum();
+        let memory = self.processes.values().map(|process| self.usage(process).memory.0).sum();
+        let cpu = self.processes.values().map(|process| self.usage(process).cpu.0).sum();
         HostReport {
             memory_used: self.host.memory_used.plus(Bytes(memory)),
             cpu_used: self.host.cpu_used.plus(Permille(cpu)),
             ..self.host
         }
+    }
+
+    /// What one of its processes takes.
+    pub(crate) fn usage(&self, process: &Process) -> Usage {
+        let declared = Usage { memory: process.needs.memory, cpu: process.needs.cpu };
+        self.takes.unwrap_or(declared)
+    }
+
+    /// Whether its disk refuses what is written from now on.
+    pub fn fill_disk(&mut self, full: bool) {
+        self.disk.full = full;
+    }
+
+    /// Forgets everything on disk.
+    pub fn wipe_disk(&mut self) {
+        self.disk.wipe();
     }
 
     /// Takes the wanted routes; the paths that changed.

@@ -14,7 +14,8 @@ use sdr_core::{
 use super::{
     air::{FRAME_BYTES, number_of},
     disk::Order,
-    fleet::{ActiveProcess, Due, Fleet, Turn},
+    due::{Due, Turn},
+    fleet::{ActiveProcess, Fleet},
     process::{Behaviour, Process},
     sight::Sight,
 };
@@ -52,6 +53,9 @@ impl Fleet {
                         Ok(Accepted::Role(_)) => continue,
                         Err(error) => Err(error),
                     };
+                    if self.setup.keeps_events {
+                        self.answers.push((number, answer.clone()));
+                    }
                     self.sights.push(Sight::Answered { robot: number, answer });
                 }
                 Effect::Event(event) => {
@@ -276,10 +280,8 @@ impl Fleet {
         let due = Due::Sample { robot: number, life: robot.life };
         self.queue.push(self.now + self.setup.host_period, due);
         let host = robot.measured();
-        let usage =
-            |process: &Process| Usage { memory: process.needs.memory, cpu: process.needs.cpu };
         let figures: Vec<(InstanceId, Usage)> =
-            robot.processes.iter().map(|(id, process)| (*id, usage(process))).collect();
+            robot.processes.iter().map(|(id, process)| (*id, robot.usage(process))).collect();
         if !figures.is_empty() {
             self.tell(number, Input::Usage(figures));
         }

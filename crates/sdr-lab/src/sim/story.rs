@@ -5,7 +5,7 @@ use sdr_core::{event::Event, time::Instant};
 use super::{Fleet, fleet::BEGIN};
 
 /// Everything that struck and everything brains said, in order.
-pub(crate) fn lines(fleet: &Fleet) -> Vec<String> {
+pub fn story(fleet: &Fleet) -> Vec<String> {
     let struck = fleet.struck.iter().map(|(at, what)| (*at, format!("!! {what}")));
     let told = fleet.told.iter().map(|(at, robot, event)| (*at, line(*robot, event)));
     let mut all: Vec<(Instant, String)> = struck.chain(told).collect();

@@ -8,6 +8,7 @@ use sdr_core::{
     order::hash64,
     record::{FleetValue, RecordKind},
     time::Instant,
+    units::Bytes,
 };
 
 use super::{air::Way, fleet::Fleet};
@@ -111,6 +112,25 @@ impl Fleet {
         wanted
     }
 
+    /// Whether one of these robots may and can run a component beside what it runs now.
+    pub fn is_feasible(&self, key: &ComponentKey, side: &[usize]) -> bool {
+        let name = format!("{}/{}", key.system, key.name);
+        let specs = side.iter().take(SPEAKERS).filter_map(|robot| {
+            let (version, value) = self.table(*robot)?.get(RecordKind::COMPONENT, &name)?;
+            let FleetValue::Component(spec) = value else { return None };
+            Some((version.revision, spec))
+        });
+        let Some((_, spec)) = specs.max_by_key(|(revision, _)| *revision) else { return false };
+        side.iter().map(|robot| &self.robots[*robot]).any(|robot| {
+            let host = robot.measured();
+            let memory = robot.facts.memory_capacity.less(host.memory_used).less(spec.needs.memory);
+            let cpu = robot.facts.cpu_capacity.less(host.cpu_used).less(spec.needs.cpu);
+            spec.place.robot.as_ref().is_none_or(|only| *only == robot.id)
+                && memory >= MEMORY_LEFT
+                && cpu.0 * 5 >= robot.facts.cpu_capacity.0
+        })
+    }
+
     /// How many components were ever seen.
     pub fn components(&self) -> usize {
         self.keys.len()
@@ -136,6 +156,8 @@ impl Fleet {
     }
 }
 
+/// What the default allocation wants left free.
+const MEMORY_LEFT: Bytes = Bytes::mega(200);
 /// Robots whose tables are looked at for what is wanted.
 const SPEAKERS: usize = 12;
 

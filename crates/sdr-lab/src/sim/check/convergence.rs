@@ -2,14 +2,21 @@
 //! one coordinator whom all know; equal tables; every connection carries the latest token.
 
 use sdr_core::{
+    brain::Brain,
+    id::{ComponentKey, RobotId},
+    lifecycle::LifecycleState,
     mesh::FleetTable,
+    order::Token,
     record::{FleetValue, RecordKind},
+    report::Report,
 };
 
 use crate::sim::{Fleet, table_hash};
 
 /// Records compared byte by byte; of larger fleets the first robots stand for all.
 const RECORDS_MAX: usize = 100_000;
+/// Robots of a large fleet that are asked what they know of all.
+const SPEAKERS: usize = 12;
 
 /// What is not right yet; `None` when all is.
 pub fn lacking(fleet: &Fleet) -> Option<String> {
@@ -18,6 +25,8 @@ pub fn lacking(fleet: &Fleet) -> Option<String> {
     one_coordinator(fleet, &on)
         .or_else(|| equal_tables(fleet, &on))
         .or_else(|| each_once(fleet, &on))
+        .or_else(|| latest_edition(fleet, &on))
+        .or_else(|| known_to_all(fleet, &on))
         .or_else(|| all_heard(fleet))
 }
 
@@ -75,6 +84,60 @@ fn each_once(fleet: &Fleet, on: &[usize]) -> Option<String> {
         !fleet.active_of(*component).is_empty() && !wanted.contains(fleet.key(*component))
     })?;
     Some(format!("{} is active and nobody wants it", fleet.key(extra)))
+}
+
+/// Every process runs what its component is wanted to be now.
+fn latest_edition(fleet: &Fleet, on: &[usize]) -> Option<String> {
+    let table = fleet.table(*on.first()?)?;
+    for robot in on {
+        for (_, process) in fleet.robots[*robot].processes() {
+            let key = &process.component;
+            let Some((_, FleetValue::Component(spec))) =
+                table.get(RecordKind::COMPONENT, &format!("{}/{}", key.system, key.name))
+            else {
+                continue;
+            };
+            if spec.needs != process.needs {
+                return Some(format!("{key} runs an old edition on robot-{}", robot + 1));
+            }
+        }
+    }
+    None
+}
+
+/// What each robot says of its processes is what the others hold of it.
+fn known_to_all(fleet: &Fleet, on: &[usize]) -> Option<String> {
+    for author in on {
+        let id = &fleet.robots[*author].id;
+        let own = instances_of(fleet, *author, id);
+        for other in on.iter().take(SPEAKERS) {
+            if instances_of(fleet, *other, id) != own {
+                return Some(format!("robot-{} has old news of {id}", other + 1));
+            }
+        }
+    }
+    None
+}
+
+/// State and token of each process of `author`, as `robot` holds it.
+fn instances_of(
+    fleet: &Fleet,
+    robot: usize,
+    author: &RobotId,
+) -> Vec<(ComponentKey, LifecycleState, Option<Token>)> {
+    let mesh = fleet.robots[robot].brain().map(Brain::mesh);
+    let author = mesh.and_then(|mesh| mesh.authors().author(author));
+    let reports = author.into_iter().flat_map(|author| author.reports());
+    let instances = reports.filter_map(|report| match report {
+        Report::Instance(of) => Some((of.component.clone(), of.state, of.token.clone())),
+        Report::Facts(_)
+        | Report::Host(_)
+        | Report::Link(..)
+        | Report::Condition(_)
+        | Report::Succession(_)
+        | Report::Homeless(_) => None,
+    });
+    instances.collect()
 }
 
 fn all_heard(fleet: &Fleet) -> Option<String> {

@@ -15,18 +15,16 @@ pub struct Deployments {
 
 impl Checker for Deployments {
     fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
-        match sight {
-            Sight::Answered { robot, answer: Ok(answer) } => {
-                let entry = self.accepted.entry(answer.system.clone()).or_default();
-                if answer.revision > entry.0 {
-                    *entry = (answer.revision, BTreeSet::from([*robot]));
-                }
-                None
+        if let Sight::Answered { robot, answer: Ok(answer) } = sight {
+            let entry = self.accepted.entry(answer.system.clone()).or_default();
+            if answer.revision > entry.0 {
+                *entry = (answer.revision, BTreeSet::from([*robot]));
             }
-            Sight::On { robot, disk_kept } => self.restarted(fleet, *robot, *disk_kept),
-            Sight::Look => self.look(fleet),
-            _ => None,
         }
+        if let Sight::On { robot, disk_kept } = sight {
+            return self.restarted(fleet, *robot, *disk_kept);
+        }
+        matches!(sight, Sight::Look).then(|| self.look(fleet)).flatten()
     }
 }
 

@@ -9,6 +9,10 @@ use crate::sim::{ActiveProcess, Broken, Checker, Fleet, Sight};
 /// So long after a heal, with nothing else going wrong, the same processes must be active.
 const SETTLED: Duration = Duration::from_secs(12);
 
+/// What brains say when a component is in trouble of its own.
+const TROUBLE: [&str; 6] =
+    ["exited", "hung", "error", "condition-raised", "move-started", "restart"];
+
 /// `restarted-by-heal`.
 #[derive(Debug, Default)]
 pub struct Heals {
@@ -18,44 +22,35 @@ pub struct Heals {
 
 impl Checker for Heals {
     fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
-        match sight {
-            Sight::Healed if !fleet.is_cut() => {
-                self.healed_at = Some(fleet.now);
-                self.before = (0..fleet.components())
-                    .map(|component| (component, fleet.active_of(component).to_vec()))
-                    .filter(|(_, active)| !active.is_empty())
-                    .collect();
-                None
-            }
-            // an operator wants something else, or a component is in trouble of its own
-            Sight::Asked { system, .. } => self.excuse(fleet, system, None),
-            Sight::Told { event, .. } => {
-                let trouble =
-                    ["exited", "hung", "error", "condition-raised", "move-started", "restart"];
-                match &event.system {
-                    Some(system) if trouble.contains(&event.kind.as_str()) => {
-                        self.excuse(fleet, system, event.component.as_ref())
-                    }
-                    Some(_) | None => None,
-                }
-            }
-            Sight::Off { .. } | Sight::On { .. } => {
-                self.healed_at = None;
-                None
-            }
-            Sight::Look => self.look(fleet),
-            _ => None,
+        if matches!(sight, Sight::Healed) && !fleet.is_cut() {
+            self.healed_at = Some(fleet.now);
+            self.before = (0..fleet.components())
+                .map(|component| (component, fleet.active_of(component).to_vec()))
+                .filter(|(_, active)| !active.is_empty())
+                .collect();
         }
+        // an operator wants something else, or a component is in trouble of its own
+        if let Sight::Asked { system, .. } = sight {
+            self.excuse(fleet, system, None);
+        }
+        if let Sight::Told { event, .. } = sight
+            && let (Some(system), true) = (&event.system, TROUBLE.contains(&event.kind.as_str()))
+        {
+            self.excuse(fleet, system, event.component.as_ref());
+        }
+        if matches!(sight, Sight::Off { .. } | Sight::On { .. }) {
+            self.healed_at = None;
+        }
+        matches!(sight, Sight::Look).then(|| self.look(fleet)).flatten()
     }
 }
 
 impl Heals {
-    fn excuse(&mut self, fleet: &Fleet, system: &Name, component: Option<&Name>) -> Option<Broken> {
+    fn excuse(&mut self, fleet: &Fleet, system: &Name, component: Option<&Name>) {
         self.before.retain(|number, _| {
             let key = fleet.key(*number);
             key.system != *system || component.is_some_and(|name| key.name != *name)
         });
-        None
     }
 
     fn look(&mut self, fleet: &Fleet) -> Option<Broken> {

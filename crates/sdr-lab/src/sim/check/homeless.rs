@@ -37,21 +37,17 @@ pub struct Homeless {
 
 impl Checker for Homeless {
     fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
-        match sight {
-            Sight::Told { event, .. } if TROUBLE.contains(&event.kind.as_str()) => {
-                if let (Some(system), Some(name)) = (&event.system, &event.component) {
-                    self.troubled.insert(ComponentKey::new(system, name), fleet.now);
-                }
-                None
-            }
-            Sight::Asked { system, .. } => {
-                // a new revision begins its own count
-                self.since.retain(|(_, key), _| key.system != *system);
-                None
-            }
-            Sight::Look => self.look(fleet),
-            _ => None,
+        if let Sight::Told { event, .. } = sight
+            && TROUBLE.contains(&event.kind.as_str())
+            && let (Some(system), Some(name)) = (&event.system, &event.component)
+        {
+            self.troubled.insert(ComponentKey::new(system, name), fleet.now);
         }
+        // a new revision begins its own count
+        if let Sight::Asked { system, .. } = sight {
+            self.since.retain(|(_, key), _| key.system != *system);
+        }
+        matches!(sight, Sight::Look).then(|| self.look(fleet)).flatten()
     }
 }
 
@@ -65,7 +61,8 @@ impl Homeless {
                 continue;
             }
             for key in fleet.wanted(&side) {
-                if fleet.active(&key).iter().any(|active| side.contains(&active.robot)) {
+                let runs_here = |active: &crate::sim::ActiveProcess| side.contains(&active.robot);
+                if !fleet.is_feasible(&key, &side) || fleet.active(&key).iter().any(runs_here) {
                     continue;
                 }
                 let name = (side[0], key.clone());

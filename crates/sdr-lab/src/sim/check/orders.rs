@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use sdr_core::{
-    mesh::FleetRecord,
+    mesh::{FleetRecord, FleetTable},
     order::{Version, hash64},
     record::{FleetKey, RecordKind},
 };
@@ -27,19 +27,16 @@ pub struct Orders {
 
 impl Checker for Orders {
     fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
-        match sight {
-            Sight::On { robot, disk_kept: true } => wire_before_disk(fleet, *robot),
-            Sight::Look => {
-                let robots = 0..fleet.robots.len();
-                let count: usize =
-                    robots.clone().filter_map(|robot| fleet.table(robot)).map(|t| t.len()).sum();
-                match count > RECORDS_MAX {
-                    true => None,
-                    false => robots.into_iter().find_map(|robot| self.look(fleet, robot)),
-                }
-            }
-            _ => None,
+        if let Sight::On { robot, disk_kept: true } = sight {
+            return wire_before_disk(fleet, *robot);
         }
+        let robots = 0..fleet.robots.len();
+        let tables = robots.clone().filter_map(|robot| fleet.table(robot));
+        let few = || tables.map(FleetTable::len).sum::<usize>() <= RECORDS_MAX;
+        if !matches!(sight, Sight::Look) || !few() {
+            return None;
+        }
+        robots.into_iter().find_map(|robot| self.look(fleet, robot))
     }
 }
 

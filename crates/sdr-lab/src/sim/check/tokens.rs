@@ -17,34 +17,25 @@ pub struct Tokens {
 
 impl Checker for Tokens {
     fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
-        match sight {
-            Sight::Accepted { robot, instance, connection, token } => {
-                let before =
-                    self.accepted.insert((*robot, *instance, *connection), token.clone())?;
-                (before > *token).then(|| {
-                    let what = format!("connection {connection}: {token} after {before}");
-                    Broken::new("token-decreased", what)
-                })
-            }
-            Sight::Active { robot, instance, component, token } => {
-                let life = fleet.robots[*robot].life();
-                let me = (*robot, life, *instance);
-                let before = self.used.insert((*component, token.clone()), me)?;
-                (before != me).then(|| {
-                    let what = format!(
-                        "{} is active under {token} on robot-{}, as it was on robot-{}",
-                        fleet.key(*component),
-                        robot + 1,
-                        before.0 + 1
-                    );
-                    Broken::new("token-reused", what)
-                })
-            }
-            Sight::Off { robot } => {
-                self.accepted.retain(|(of, ..), _| of != robot);
-                None
-            }
-            _ => None,
+        if let Sight::Off { robot } = sight {
+            self.accepted.retain(|(of, ..), _| of != robot);
         }
+        if let Sight::Accepted { robot, instance, connection, token } = sight {
+            let before = self.accepted.insert((*robot, *instance, *connection), token.clone())?;
+            let what = format!("connection {connection}: {token} after {before}");
+            return (before > *token).then(|| Broken::new("token-decreased", what));
+        }
+        let Sight::Active { robot, instance, component, token } = sight else { return None };
+        let me = (*robot, fleet.robots[*robot].life(), *instance);
+        let before = self.used.insert((*component, token.clone()), me)?;
+        (before != me).then(|| {
+            let what = format!(
+                "{} is active under {token} on robot-{}, as it was on robot-{}",
+                fleet.key(*component),
+                robot + 1,
+                before.0 + 1
+            );
+            Broken::new("token-reused", what)
+        })
     }
 }

@@ -1,0 +1,100 @@
+//! Faults in words.
+
+use std::{fmt, time::Duration};
+
+use super::{Behaviour, ClockFate, DiskFate, Fault, Way};
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&words(self))
+    }
+}
+
+fn words(fault: &Fault) -> String {
+    match fault {
+        Fault::Crash { robot, down, disk } => crash(*robot, *down, *disk),
+        Fault::CrashAtStore { robot, down } => {
+            format!("{} loses power in its next write, back after {}", name(*robot), seconds(*down))
+        }
+        Fault::Pause { robot, time, clock } => {
+            let what = match clock {
+                ClockFate::Runs => "agent stands",
+                ClockFate::Sleeps => "agent and clock stand",
+            };
+            format!("{}: {what} still for {}", name(*robot), seconds(*time))
+        }
+        Fault::Deaf { robot, time } => format!("{} is deaf for {}", name(*robot), seconds(*time)),
+        Fault::Storm { loss, time } => {
+            format!("{:.0} % of all datagrams are lost for {}", loss * 100.0, seconds(*time))
+        }
+        Fault::Cut { inside, way, time } => {
+            let inside: Vec<String> = inside.iter().map(|robot| name(*robot)).collect();
+            let way = match way {
+                Way::Both => "cut off",
+                Way::Out => "not heard by the others",
+            };
+            format!("{} {way} for {}", inside.join(", "), seconds(*time))
+        }
+        Fault::CutOffCoordinator { time } => {
+            format!("the coordinator is cut off for {}", seconds(*time))
+        }
+        Fault::DiskFull { robot, time } => {
+            format!("{}: disk full for {}", name(*robot), seconds(*time))
+        }
+        Fault::DiskSlow { robot, each, time } => {
+            let each = each.as_millis();
+            format!("{}: each write takes {each} ms, for {}", name(*robot), seconds(*time))
+        }
+        Fault::Exit { component } => format!("all processes of {component} are killed"),
+        Fault::Hang { component } => format!("all processes of {component} hang"),
+        Fault::Behave { robot, component, behaviour, time } => {
+            let ways = ways(behaviour);
+            format!("{component} on {} for {}: {ways}", name(*robot), seconds(*time))
+        }
+        Fault::Fade { robot, level_dbm, time } => {
+            format!("{} measures {level_dbm} dBm for {}", name(*robot), seconds(*time))
+        }
+        Fault::Deploy { robot, system } => {
+            let count = system.components.len();
+            format!("{} is told to deploy {}, {count} components", name(*robot), system.name)
+        }
+        Fault::Undeploy { robot, system } => {
+            format!("{} is told to undeploy {system}", name(*robot))
+        }
+    }
+}
+
+fn crash(robot: usize, down: Option<Duration>, disk: DiskFate) -> String {
+    let disk = match disk {
+        DiskFate::Kept => "disk kept",
+        DiskFate::Lost => "disk lost",
+    };
+    let back = match down {
+        Some(down) => format!("back after {}", seconds(down)),
+        None => "for good".into(),
+    };
+    format!("{} loses power, {disk}, {back}", name(robot))
+}
+
+fn ways(behaviour: &Behaviour) -> String {
+    let mut ways = Vec::new();
+    if behaviour.unstartable {
+        ways.push("cannot be started".into());
+    }
+    if let Some(after) = behaviour.crash_after {
+        ways.push(format!("ends {} ms after it became active", after.as_millis()));
+    }
+    if let Some((after, cause)) = behaviour.fail_after {
+        ways.push(format!("{cause} {} ms after it became active", after.as_millis()));
+    }
+    ways.push(format!("comes up in {} ms", behaviour.initialise.as_millis()));
+    ways.join(", ")
+}
+
+fn seconds(time: Duration) -> String {
+    format!("{:.1} s", time.as_secs_f64())
+}
+
+fn name(robot: usize) -> String {
+    format!("robot-{}", robot + 1)
+}
