@@ -1,6 +1,6 @@
 //! Who this robot or operator is: its certificate, its key, and the authority it trusts.
 
-use std::{fmt, path::Path};
+use std::{fmt, path::Path, time::Duration};
 
 use rustls::{
     crypto::ring as provider,
@@ -33,15 +33,15 @@ pub struct Identity {
 
 impl Identity {
     /// Reads `fleet.crt`, `own.crt` and `own.key` in `folder` and checks that they belong
-    /// together. `wall` is the time as this machine believes it: a certificate that is
+    /// together. `wall` is the time since 1970 as this machine believes it: a certificate that is
     /// expired by it is still taken ([`Identity::standing`] says so).
-    pub fn load(folder: &Path, wall: UnixTime) -> Result<Self, KeysError> {
+    pub fn load(folder: &Path, wall: Duration) -> Result<Self, KeysError> {
         let authority_file = folder.join(AUTHORITY_CERTIFICATE);
         let trust = Trust::load(&authority_file)?;
         let own_file = folder.join(OWN_CERTIFICATE);
         let certificate = read_certificate(&own_file)?;
-        let (bearer, standing) =
-            inspect(&certificate, &trust, wall).map_err(|refused| KeysError::Mismatch {
+        let (bearer, standing) = inspect(&certificate, &trust, UnixTime::since_unix_epoch(wall))
+            .map_err(|refused| KeysError::Mismatch {
                 file: own_file.clone(),
                 found: format!("{refused}; the authority is that of {}", authority_file.display()),
                 next: "copy the whole folder that `sdr keys` made".into(),

@@ -41,12 +41,15 @@ mod trust;
 mod identity;
 mod papers;
 
+mod delivery;
+
 pub mod seal;
 pub mod tls;
 
 #[cfg(feature = "authority")]
 pub mod authority;
 
+pub use delivery::{Delivery, DeliveryAnswer, DeliveryError, Received};
 pub use folder::KeysError;
 pub use holder::{Bearer, Fingerprint, Holder, OperatorId, Role};
 pub use identity::Identity;

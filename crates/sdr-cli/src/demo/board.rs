@@ -240,7 +240,7 @@ mod tests {
     };
 
     fn board() -> Board {
-        let session = Session { agent: None, output: Output::new(Format::Text) };
+        let session = Session { agent: None, keys: None, output: Output::new(Format::Text) };
         let bars = Bars {
             allocation_memory_bytes: Some(500_000_000),
             relaxed_memory_bytes: Some(250_000_000),

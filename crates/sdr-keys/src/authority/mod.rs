@@ -20,6 +20,7 @@ use std::{
     fmt,
     fs::File,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 use rcgen::KeyPair;
@@ -78,8 +79,9 @@ pub struct Certificate {
 }
 
 impl Authority {
-    /// Makes the authority of `fleet` in `folder`, or opens the one that is there.
-    pub fn init(folder: &Path, fleet: &RobotId, wall: UnixTime) -> Result<(Self, Made), KeysError> {
+    /// Makes the authority of `fleet` in `folder`, or opens the one that is there. `wall` is
+    /// the time since 1970, from which certificates count theirs.
+    pub fn init(folder: &Path, fleet: &RobotId, wall: Duration) -> Result<(Self, Made), KeysError> {
         if folder.join(CERTIFICATE).exists() {
             let there = Self::open(folder, wall)?;
             return match there.trust.fleet() == fleet.as_str() {
@@ -91,6 +93,7 @@ impl Authority {
                 }),
             };
         }
+        let wall = UnixTime::since_unix_epoch(wall);
         make_private(folder)?;
         let lock = lock(folder)?;
         if folder.join(KEY).exists() {
@@ -115,7 +118,7 @@ impl Authority {
     }
 
     /// Opens the authority in `folder`.
-    pub fn open(folder: &Path, wall: UnixTime) -> Result<Self, KeysError> {
+    pub fn open(folder: &Path, wall: Duration) -> Result<Self, KeysError> {
         let certificate = folder.join(CERTIFICATE);
         if !certificate.exists() {
             let next = "`sdr keys init` makes an authority, --authority DIR names another".into();
@@ -143,6 +146,7 @@ impl Authority {
             // A rotation was interrupted between its two files; nobody has seen the new key.
             papers = sign_papers(&trust, &key, &keys, papers.denied().clone());
         }
+        let wall = UnixTime::since_unix_epoch(wall);
         Ok(Self { folder: folder.into(), trust, key, keys, papers, wall, _lock: lock })
     }
 
