@@ -13,11 +13,15 @@
 //! are passed in, files are read and written only by what has a folder as argument.
 //!
 //! ```
+//! use std::time::Duration;
+//!
 //! use sdr_core::time::Instant;
 //! use sdr_keys::{MeshKey, KeyId, seal::{Opened, Seal}};
 //!
 //! let key = || MeshKey::new(KeyId(1), [7; 32]);
-//! let seal = |salt: u8| Seal::new([key()], Instant::ZERO, Box::new(move |bytes: &mut [u8]| bytes.fill(salt)));
+//! let chance = |salt: u8| Box::new(move |bytes: &mut [u8]| bytes.fill(salt));
+//! let grace = Duration::from_secs(20);
+//! let seal = |salt: u8| Seal::new([key()], grace, Instant::ZERO, chance(salt));
 //! let (mut here, mut there) = (seal(1), seal(2));
 //!
 //! let now = Instant::from_millis(1);
@@ -42,8 +46,10 @@ mod identity;
 mod papers;
 
 mod delivery;
+mod keyset;
 
 pub mod seal;
+pub mod stream;
 pub mod tls;
 
 #[cfg(feature = "authority")]
@@ -53,6 +59,7 @@ pub use delivery::{Delivery, DeliveryAnswer, DeliveryError, Received};
 pub use folder::KeysError;
 pub use holder::{Bearer, Fingerprint, Holder, OperatorId, Role};
 pub use identity::Identity;
+pub use keyset::Keyset;
 pub use mesh_key::{KeyId, MeshKey, MeshKeys};
 pub use papers::{DenyList, Papers};
 pub use statement::{

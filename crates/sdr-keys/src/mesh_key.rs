@@ -4,10 +4,7 @@ use std::{collections::BTreeMap, fmt, path::Path};
 
 use ring::digest;
 
-use crate::{
-    folder::{KeysError, read_text},
-    hex,
-};
+use crate::{folder::KeysError, hex};
 
 /// Most keys in a file: the newest ones stay.
 const KEYS_MAX: usize = 4;
@@ -115,12 +112,8 @@ impl MeshKeys {
         self.0.values()
     }
 
-    /// Reads a file as [`MeshKeys::to_text`] writes it; `path` names it in errors.
-    pub fn load(path: &Path) -> Result<Self, KeysError> {
-        Self::parse(path, &read_text(path)?)
-    }
-
-    fn parse(path: &Path, text: &str) -> Result<Self, KeysError> {
+    /// Reads what [`MeshKeys::to_text`] wrote; `path` names it in errors.
+    pub(crate) fn parse(path: &Path, text: &str) -> Result<Self, KeysError> {
         let mut keys = BTreeMap::new();
         for (index, line) in text.lines().enumerate() {
             if line.is_empty() || line.starts_with('#') {

@@ -8,11 +8,12 @@ use std::{
 use rustls::pki_types::{CertificateDer, pem::PemObject as _};
 use sdr_core::id::RobotId;
 
-use super::{Authority, Certificate, MESH_KEYS, NOTICES, Overview, sign};
+use super::{Authority, Certificate, Overview, sign};
 use crate::{
     folder::{KeysError, make_private, read_text, write_private},
     holder::{Fingerprint, Holder, Role},
     identity::{AUTHORITY_CERTIFICATE, OWN_CERTIFICATE, OWN_KEY},
+    keyset::{MESH_KEYS, NOTICES},
     tls::gate::inspect,
     trust::read_certificate,
 };

@@ -30,6 +30,7 @@ use sdr_core::id::RobotId;
 
 use crate::{
     folder::{KeysError, make_private, read_secret, read_text, write_private},
+    keyset::{MESH_KEYS, NOTICES},
     mesh_key::{KeyId, MeshKey, MeshKeys},
     papers::{DenyList, Papers},
     statement::KeyNotice,
@@ -40,11 +41,6 @@ pub use revoke::Revoked;
 
 const CERTIFICATE: &str = "authority.crt";
 const KEY: &str = "authority.key";
-/// Mesh keys, here and in a robot's folder.
-pub(crate) const MESH_KEYS: &str = "mesh.keys";
-/// Signed statements, here and in all folders.
-pub(crate) const NOTICES: &str = "notices";
-
 /// An opened authority; nobody else changes it meanwhile.
 pub struct Authority {
     folder: PathBuf,
@@ -134,7 +130,8 @@ impl Authority {
             found: format!("not the key of {}", certificate.display()),
             next: "bring both back from a copy of this folder".into(),
         })?;
-        let keys = MeshKeys::load(&folder.join(MESH_KEYS))?;
+        let keys_file = folder.join(MESH_KEYS);
+        let keys = MeshKeys::parse(&keys_file, &read_secret(&keys_file)?)?;
         let notices = folder.join(NOTICES);
         let mut papers =
             Papers::parse(&read_text(&notices)?, &trust).map_err(|error| KeysError::Malformed {

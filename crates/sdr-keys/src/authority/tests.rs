@@ -122,7 +122,10 @@ fn a_robot_is_added_once_and_refreshed_afterwards() {
 
     assert_eq!([first.made, again.made, later.made], [Made::New, Made::There, Made::Refreshed]);
     assert_eq!(first.fingerprint, later.fingerprint);
-    assert_eq!(MeshKeys::load(&out.join(MESH_KEYS)).unwrap().newest().id(), KeyId(2));
+    let trust = &bench.authority.trust;
+    let set = crate::Keyset::load(&out, trust).unwrap();
+    assert_eq!(set.newest(), KeyId(2));
+    assert_eq!(set.delivery().open(trust).unwrap().papers, *bench.authority.papers());
     let elsewhere = bench.authority.add_robot(&name("robot-1"), &bench.out("other"));
     let error = elsewhere.unwrap_err().to_string();
     assert!(error.contains("robot/robot-1 has a certificate, and it is not in here"), "{error}");

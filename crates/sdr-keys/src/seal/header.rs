@@ -30,6 +30,8 @@ pub(super) enum Kind {
     Challenge = 1,
     /// I live: the random number.
     Proof = 2,
+    /// It holds a signed line of the authority.
+    Notice = 3,
 }
 
 /// Who sealed a datagram, with what.
@@ -47,7 +49,7 @@ impl Header {
         if datagram.len() < OVERHEAD_BYTES {
             return None;
         }
-        let kind = [Kind::Data, Kind::Challenge, Kind::Proof]
+        let kind = [Kind::Data, Kind::Challenge, Kind::Proof, Kind::Notice]
             .into_iter()
             .find(|kind| VERSION | *kind as u8 == datagram[0])?;
         let mut counter = [0; 8];

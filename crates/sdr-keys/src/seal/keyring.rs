@@ -7,13 +7,24 @@ use sdr_core::time::Instant;
 use super::Refusal;
 use crate::mesh_key::{KeyId, MeshKey};
 
-/// From learning a key to sealing with it, so that the others learn it too; as long again,
-/// and older keys open no more.
-pub const KEY_GRACE: Duration = Duration::from_secs(20);
+/// From when on a key that was just learnt seals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Begin {
+    /// Others seal with it already.
+    Now,
+    /// After the grace, so that the others learn it too.
+    AfterGrace,
+}
 
 /// The mesh keys of one robot, each with the moment from which it may seal.
+///
+/// A key opens as soon as it is known; when a newer one has been sealing for a grace, it
+/// opens no more.
 #[derive(Clone)]
-pub struct Keyring(BTreeMap<KeyId, Held>);
+pub struct Keyring {
+    grace: Duration,
+    held: BTreeMap<KeyId, Held>,
+}
 
 #[derive(Clone)]
 struct Held {
@@ -27,31 +38,38 @@ impl Keyring {
     ///
     /// # Panics
     /// When there is none.
-    pub(super) fn new(keys: impl IntoIterator<Item = MeshKey>, now: Instant) -> Self {
+    pub(super) fn new(
+        keys: impl IntoIterator<Item = MeshKey>,
+        grace: Duration,
+        now: Instant,
+    ) -> Self {
         let held = keys.into_iter().map(|key| (key.id(), Held { key, since: now }));
         let held: BTreeMap<KeyId, Held> = held.collect();
         assert!(!held.is_empty(), "a seal needs a key");
-        Self(held)
+        Self { grace, held }
     }
 
     /// Takes a key that was just learnt; one of the same number stays as it is.
-    pub(super) fn add(&mut self, now: Instant, key: MeshKey) {
-        let since = now + KEY_GRACE;
-        self.0.entry(key.id()).or_insert(Held { key, since });
+    pub(super) fn add(&mut self, now: Instant, key: MeshKey, begin: Begin) {
+        let since = match begin {
+            Begin::Now => now,
+            Begin::AfterGrace => now + self.grace,
+        };
+        self.held.entry(key.id()).or_insert(Held { key, since });
         self.drop_retired(now);
     }
 
     /// The key that seals now: the newest whose grace is over, else the oldest.
     pub(super) fn sealing(&self, now: Instant) -> &MeshKey {
-        let ready = self.0.values().rev().find(|held| held.since <= now);
-        &ready.or_else(|| self.0.values().next()).expect("there is always a key").key
+        let ready = self.held.values().rev().find(|held| held.since <= now);
+        &ready.or_else(|| self.held.values().next()).expect("there is always a key").key
     }
 
     /// The key `id`, when it opens now.
     pub(super) fn opening(&self, now: Instant, id: KeyId) -> Result<&MeshKey, Refusal> {
-        let newer = self.0.range(id..).filter(|(other, _)| **other != id);
-        let retired = newer.into_iter().any(|(_, held)| held.since + KEY_GRACE <= now);
-        match self.0.get(&id) {
+        let newer = self.held.range(id..).filter(|(other, _)| **other != id);
+        let retired = newer.into_iter().any(|(_, held)| held.since + self.grace <= now);
+        match self.held.get(&id) {
             Some(held) if !retired => Ok(&held.key),
             Some(_) => Err(Refusal::Retired(id)),
             None if retired || id < self.newest() => Err(Refusal::Retired(id)),
@@ -61,7 +79,7 @@ impl Keyring {
 
     /// The greatest number.
     pub fn newest(&self) -> KeyId {
-        *self.0.keys().next_back().expect("there is always a key")
+        *self.held.keys().next_back().expect("there is always a key")
     }
 
     /// The number of the key that seals at `now`.
@@ -71,9 +89,9 @@ impl Keyring {
 
     fn drop_retired(&mut self, now: Instant) {
         let retired: Vec<KeyId> =
-            self.0.keys().filter(|id| self.opening(now, **id).is_err()).copied().collect();
+            self.held.keys().filter(|id| self.opening(now, **id).is_err()).copied().collect();
         for id in retired {
-            self.0.remove(&id);
+            self.held.remove(&id);
         }
     }
 }
@@ -81,6 +99,6 @@ impl Keyring {
 impl fmt::Debug for Keyring {
     /// Numbers only.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_set().entries(self.0.keys().map(|id| id.0)).finish()
+        f.debug_set().entries(self.held.keys().map(|id| id.0)).finish()
     }
 }

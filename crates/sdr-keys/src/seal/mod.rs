@@ -23,12 +23,12 @@ mod window;
 #[cfg(test)]
 mod tests;
 
-use std::fmt;
+use std::{fmt, time::Duration};
 
 use sdr_core::time::Instant;
 
 pub use header::OVERHEAD_BYTES;
-pub use keyring::{KEY_GRACE, Keyring};
+pub use keyring::{Begin, Keyring};
 pub use opener::{SealCounters, Unproven};
 
 use crate::mesh_key::{KeyId, MeshKey};
@@ -44,6 +44,8 @@ pub type Chance = Box<dyn FnMut(&mut [u8]) + Send>;
 pub enum Opened {
     /// It is of the fleet, fresh, and this is what it holds.
     Datagram(Vec<u8>),
+    /// A line that its sender says the authority signed: to be checked.
+    Notice(String),
     /// Send this back to where it came from; it is never longer than what came.
     Answer(Vec<u8>),
     /// A start has just proven that it lives; its datagrams are taken from now on.
@@ -97,18 +99,24 @@ pub struct Seal {
 }
 
 impl Seal {
-    /// Seals under a new start with the newest of `keys` and opens with all of them.
+    /// Seals under a new start with the newest of `keys` and opens with all of them; `grace`
+    /// is the time from learning another key to sealing with it.
     ///
     /// # Panics
     /// When there is no key.
-    pub fn new(keys: impl IntoIterator<Item = MeshKey>, now: Instant, mut chance: Chance) -> Self {
-        let keyring = Keyring::new(keys, now);
+    pub fn new(
+        keys: impl IntoIterator<Item = MeshKey>,
+        grace: Duration,
+        now: Instant,
+        mut chance: Chance,
+    ) -> Self {
+        let keyring = Keyring::new(keys, grace, now);
         Self { keyring, sealer: Sealer::new(&mut chance), opener: Opener::default(), chance }
     }
 
-    /// Takes a new key: it opens at once, and seals after [`KEY_GRACE`].
-    pub fn add_key(&mut self, now: Instant, key: MeshKey) {
-        self.keyring.add(now, key);
+    /// Takes a new key: it opens at once.
+    pub fn add_key(&mut self, now: Instant, key: MeshKey, begin: Begin) {
+        self.keyring.add(now, key, begin);
     }
 
     /// Which keys there are.
@@ -121,12 +129,24 @@ impl Seal {
         self.seal_as(now, Kind::Data, bytes)
     }
 
+    /// The datagram that carries a signed line.
+    pub fn seal_notice(&mut self, now: Instant, line: &str) -> Vec<u8> {
+        self.seal_as(now, Kind::Notice, line.as_bytes())
+    }
+
+    /// For somebody who sealed with a retired key: a datagram that says nothing but which key
+    /// is in use; never longer than the `came` bytes that came, or nothing.
+    pub fn hint(&mut self, now: Instant, came: usize) -> Option<Vec<u8>> {
+        (came >= OVERHEAD_BYTES).then(|| self.seal_as(now, Kind::Proof, &[]))
+    }
+
     /// Looks into a datagram.
     pub fn open(&mut self, now: Instant, datagram: &[u8]) -> Opened {
         let verdict =
             self.opener.open(now, datagram, &self.keyring, self.sealer.start(), &mut self.chance);
         match verdict {
             Verdict::Data(bytes) => Opened::Datagram(bytes),
+            Verdict::Notice(line) => Opened::Notice(line),
             Verdict::Proven => Opened::Proven,
             Verdict::Ask(question) => Opened::Answer(self.seal_as(now, Kind::Challenge, &question)),
             Verdict::Prove(answer) => Opened::Answer(self.seal_as(now, Kind::Proof, &answer)),

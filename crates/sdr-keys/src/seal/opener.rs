@@ -62,6 +62,7 @@ pub struct Unproven {
 /// What to do with a datagram.
 pub(super) enum Verdict {
     Data(Vec<u8>),
+    Notice(String),
     Proven,
     /// Seal this as a challenge and send it back.
     Ask([u8; QUESTION_BYTES]),
@@ -110,6 +111,11 @@ impl Opener {
                 self.counters.opened += 1;
                 Verdict::Data(bytes)
             }
+            (Some(_), Kind::Notice) => match String::from_utf8(bytes) {
+                Ok(line) => Verdict::Notice(line),
+                Err(_) => self.refuse(Refusal::Stray),
+            },
+            (None, Kind::Notice) => self.refuse(Refusal::Unproven),
             // A robot that restarted asks before anybody knows its new start.
             (Some(_) | None, Kind::Challenge) => self.answer(&bytes, own),
             (Some(_), Kind::Proof) => self.refuse(Refusal::Stray),

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use super::opener::{QUESTION_LIFE, QUESTIONS_MAX, SENDERS_MAX};
 use super::*;
 
+const KEY_GRACE: Duration = Duration::from_secs(20);
 const WORDS: &[u8] = b"a datagram of the mesh";
 
 fn key(id: u16) -> MeshKey {
@@ -25,7 +26,7 @@ fn chance(seed: u64) -> Chance {
 }
 
 fn robot(seed: u64) -> Seal {
-    Seal::new([key(1)], Instant::ZERO, chance(seed))
+    Seal::new([key(1)], KEY_GRACE, Instant::ZERO, chance(seed))
 }
 
 fn at(millis: u64) -> Instant {
@@ -158,8 +159,9 @@ fn strangers_cannot_fill_the_memory() {
 #[test]
 fn other_keys_plain_words_and_cut_datagrams_are_told_apart() {
     let mut there = robot(2);
-    let mut newer = Seal::new([key(9)], Instant::ZERO, chance(5));
-    let mut liar = Seal::new([MeshKey::new(KeyId(1), [99; 32])], Instant::ZERO, chance(6));
+    let mut newer = Seal::new([key(9)], KEY_GRACE, Instant::ZERO, chance(5));
+    let mut liar =
+        Seal::new([MeshKey::new(KeyId(1), [99; 32])], KEY_GRACE, Instant::ZERO, chance(6));
     let datagram = newer.seal(at(1), WORDS);
     assert_eq!(there.open(at(1), &datagram), Opened::Refused(Refusal::NoKey(KeyId(9))));
     let forged = liar.seal(at(1), WORDS);
@@ -179,10 +181,10 @@ fn a_rotation_under_traffic_loses_nothing_and_retires_the_old_key() {
     let mut sealed_with = Vec::new();
     for now in 1..60 {
         if now == 5 {
-            here.add_key(second(now), key(2));
+            here.add_key(second(now), key(2), Begin::AfterGrace);
         }
         if now == 15 {
-            there.add_key(second(now), key(2));
+            there.add_key(second(now), key(2), Begin::AfterGrace);
         }
         let datagram = here.seal(second(now), WORDS);
         sealed_with.push(datagram[2]);
@@ -194,19 +196,44 @@ fn a_rotation_under_traffic_loses_nothing_and_retires_the_old_key() {
     let mut revoked = robot(7);
     let datagram = revoked.seal(second(60), WORDS);
     assert_eq!(there.open(second(60), &datagram), Opened::Refused(Refusal::Retired(KeyId(1))));
-    here.add_key(second(61), key(3));
+    here.add_key(second(61), key(3), Begin::Now);
     assert_eq!(here.open(second(61), &datagram), Opened::Refused(Refusal::Retired(KeyId(1))));
 }
 
 #[test]
 fn a_restarted_robot_seals_with_its_newest_key_and_opens_older_ones_for_a_grace() {
-    let mut restarted = Seal::new([key(2), key(1)], at(1000), chance(1));
+    let mut restarted = Seal::new([key(2), key(1)], KEY_GRACE, at(1000), chance(1));
     let mut other = robot(2);
     let old = other.seal(at(1000), WORDS);
     assert_eq!(restarted.seal(at(1000), b"")[2], 2);
     assert!(matches!(restarted.open(at(1000), &old), Opened::Answer(_)));
     let late = at(1000) + KEY_GRACE;
     assert_eq!(restarted.open(late, &old), Opened::Refused(Refusal::Retired(KeyId(1))));
+}
+
+#[test]
+fn a_robot_with_a_retired_key_is_told_that_there_is_a_newer_one() {
+    let (mut here, mut away) = (robot(1), robot(2));
+    here.add_key(at(0), key(2), Begin::Now);
+    let late = at(0) + KEY_GRACE;
+    let datagram = away.seal(late, WORDS);
+    assert_eq!(here.open(late, &datagram), Opened::Refused(Refusal::Retired(KeyId(1))));
+
+    let hint = here.hint(late, datagram.len()).unwrap();
+    assert!(hint.len() <= datagram.len());
+    assert_eq!(away.open(late, &hint), Opened::Refused(Refusal::NoKey(KeyId(2))));
+    assert_eq!(here.hint(late, 31), None);
+}
+
+#[test]
+fn notices_are_taken_of_the_living_alone() {
+    let (mut here, mut there) = (robot(1), robot(2));
+    let early = here.seal_notice(at(1), "sdr1 keys");
+    assert_eq!(there.open(at(1), &early), Opened::Refused(Refusal::Unproven));
+    introduce(&mut here, &mut there, at(1));
+    let notice = here.seal_notice(at(2), "sdr1 keys");
+    assert_eq!(there.open(at(2), &notice), Opened::Notice("sdr1 keys".into()));
+    assert_eq!(there.open(at(2), &notice), Opened::Refused(Refusal::Replayed));
 }
 
 #[test]
