@@ -134,10 +134,8 @@ impl World {
         let keys = FleetKeys::open(robot, &ground.events, &trouble)?;
         let remote = api::open_remote(robot.api.listen).await?;
         let (mesh, streams) = start_mesh(robot, keys.clone(), sender.clone(), &trouble).await?;
-        let mut brain_config = config::brain(robot);
-        if let Some(keys) = &keys {
-            brain_config.fleet = keys.identity().fleet().into();
-        }
+        let fleet = keys.as_ref().map(|keys| keys.identity().fleet());
+        let mut brain_config = config::brain(robot, fleet);
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
         let facts = brain_config.facts.clone();
         let installed = Installed::new(config::component_path(robot), facts, sender.clone());

@@ -9,7 +9,7 @@ use sdr_keys::{Delivery, KeyId};
 use thiserror::Error;
 use tokio::time::timeout;
 
-use super::{BlobHash, StoreError, Streams, store::BLOB_BYTES_MAX};
+use super::{BlobHash, BlobStore, StoreError, Streams, store::BLOB_BYTES_MAX};
 
 /// How long a handshake may take.
 const CONNECT_WITHIN: Duration = Duration::from_secs(5);
@@ -70,10 +70,10 @@ impl Streams {
         if length > BLOB_BYTES_MAX {
             return Err(StoreError::TooLarge { length, allowed: BLOB_BYTES_MAX }.into());
         }
-        if let Some(bytes) = self.store.read(&hash)? {
+        if let Some(bytes) = self.on_disk(move |store| store.read(&hash)).await? {
             return Ok(bytes);
         }
-        let mut bytes = self.store.partial(&hash)?;
+        let mut bytes = self.on_disk(move |store| store.partial(&hash)).await?;
         // More than the whole is none of it.
         if size(&bytes) > length {
             bytes.clear();
@@ -92,11 +92,21 @@ impl Streams {
         let ended = take(&mut receive, &mut bytes, length).await;
         connection.close(0_u32.into(), b"done");
         if let Err(reason) = ended {
-            self.store.keep_partial(&hash, &bytes)?;
-            return Err(FetchError::Broken { peer, came: size(&bytes), length, reason });
+            let came = size(&bytes);
+            self.on_disk(move |store| store.keep_partial(&hash, &bytes)).await?;
+            return Err(FetchError::Broken { peer, came, length, reason });
         }
-        self.store.finish(&hash, &bytes)?;
-        Ok(bytes)
+        self.on_disk(move |store| store.finish(&hash, &bytes).map(|()| bytes)).await
+    }
+
+    /// Disk and hashing are not for the loop's thread.
+    async fn on_disk<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&BlobStore) -> Result<T, StoreError> + Send + 'static,
+    ) -> Result<T, FetchError> {
+        let store = self.store.clone();
+        let done = tokio::task::spawn_blocking(move || work(&store)).await;
+        Ok(done.expect("a panic there ended the agent")?)
     }
 
     /// The mesh key of the robot at `peer`, when it is newer than `have`.

@@ -30,7 +30,11 @@ pub(super) async fn follow(streams: Streams, mut hints: mpsc::Receiver<KeyHint>)
         let have = *streams.keys.newest().borrow();
         match streams.fetch_key(from, have).await {
             Ok(delivery) => {
-                if let Err(error) = streams.keys.learn(&delivery, begin, &from.to_string()) {
+                let keys = streams.keys.clone();
+                let learned = tokio::task::spawn_blocking(move || {
+                    keys.learn(&delivery, begin, &from.to_string())
+                });
+                if let Ok(Err(error)) = learned.await {
                     tracing::warn!(event = "key-not-learned", %from, %error);
                 }
             }

@@ -28,6 +28,12 @@ pub(super) async fn serve(streams: Streams) {
             incoming.refuse();
             continue;
         };
+        // When many come, each must first show that it is where it says.
+        let many = room.available_permits() < CONNECTIONS_MAX / 2;
+        if many && !incoming.remote_address_validated() && incoming.may_retry() {
+            drop(incoming.retry());
+            continue;
+        }
         let streams = streams.clone();
         tokio::spawn(async move {
             match incoming.await {

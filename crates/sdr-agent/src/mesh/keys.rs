@@ -67,6 +67,8 @@ struct Inner {
     gate: Arc<Gate>,
     seal: Mutex<Seal>,
     set: Mutex<Keyset>,
+    /// Held while a key goes to the disk, which may take long; `set` never is.
+    learning: Mutex<()>,
     newest: watch::Sender<KeyId>,
     /// Where keys that were learned are kept.
     folder: PathBuf,
@@ -119,13 +121,15 @@ impl FleetKeys {
             seal: Mutex::new(seal),
             newest: watch::Sender::new(set.newest()),
             set: Mutex::new(set),
+            learning: Mutex::new(()),
             folder: learned,
             events: events.clone(),
             trouble: trouble.clone(),
         }))))
     }
 
-    /// Takes a newer key with its papers: on the disk first, then for opening datagrams.
+    /// Takes a newer key with its papers: on the disk first, then for opening datagrams. Waits
+    /// for the disk: not for the loop's thread.
     pub(crate) fn learn(
         &self,
         delivery: &Delivery,
@@ -133,15 +137,15 @@ impl FleetKeys {
         from: &str,
     ) -> Result<Learned, NotLearned> {
         let received = delivery.open(self.trust())?;
-        let mut set = self.set();
-        let mut grown = set.clone();
+        let _one_at_a_time = self.0.learning.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut grown = self.set().clone();
         let key = received.key.clone();
         if !grown.take(received) {
             return Ok(Learned::Known);
         }
         grown.save(&self.0.folder)?;
-        *set = grown;
-        for denial in set.papers().denied().iter() {
+        *self.set() = grown.clone();
+        for denial in grown.papers().denied().iter() {
             if self.0.gate.deny(denial.clone()) {
                 let holder = &denial.denial().holder;
                 let said = format!("{holder} is denied; {from} says so, signed by the authority");
@@ -150,7 +154,6 @@ impl FleetKeys {
                 self.0.events.publish(event.number("denial", number));
             }
         }
-        drop(set);
         self.seal().add_key(clock::now(), key.clone(), begin);
         let said = format!("mesh key {} from {from}", key.id());
         let event = self.0.events.new_event("key-learned", said);

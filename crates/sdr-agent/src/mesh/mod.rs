@@ -1,5 +1,6 @@
 //! The robot's ear and mouth for other robots.
 
+mod addresses;
 pub(crate) mod keys;
 pub(crate) mod sealed;
 pub(crate) mod udp;

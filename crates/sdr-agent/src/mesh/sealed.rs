@@ -1,9 +1,6 @@
 //! What comes in at the port of a mesh with keys: datagrams, streams, and what is neither.
 
-use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::net::SocketAddr;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,14 +9,11 @@ use sdr_keys::seal::{Begin, Opened, Refusal};
 use tokio::net::UdpSocket;
 use tokio::sync::mpsc;
 
+use super::addresses::Addresses;
 use super::keys::FleetKeys;
 use crate::clock;
 use crate::trouble::{Kind, Trouble};
 
-/// Most robots that are told of a new key directly.
-const LISTENERS_MAX: usize = 1024;
-/// A robot that was not heard for so long is not told.
-const LISTENER_LIFE: Duration = Duration::from_secs(60);
 /// How often a new key is told of: datagrams are lost.
 const TELLINGS: u32 = 5;
 /// Time between two of them.
@@ -49,7 +43,7 @@ pub(super) struct Sorter {
     pub(super) socket: Arc<UdpSocket>,
     pub(super) sidings: Sidings,
     pub(super) trouble: Trouble,
-    heard: Rc<RefCell<BTreeMap<SocketAddr, Instant>>>,
+    pub(super) addresses: Addresses,
 }
 
 impl Sorter {
@@ -60,9 +54,10 @@ impl Sorter {
         sidings: Sidings,
         trouble: Trouble,
     ) -> Self {
-        let heard = Rc::new(RefCell::new(BTreeMap::new()));
-        tokio::task::spawn_local(tell_of_new_keys(keys.clone(), socket.clone(), heard.clone()));
-        Self { keys, socket, sidings, trouble, heard }
+        let addresses = Addresses::default();
+        let telling = tell_of_new_keys(keys.clone(), socket.clone(), addresses.clone());
+        tokio::task::spawn_local(telling);
+        Self { keys, socket, sidings, trouble, addresses }
     }
 
     /// What a packet holds for the brain.
@@ -76,11 +71,11 @@ impl Sorter {
         let opened = self.keys.seal().open(now, packet);
         match opened {
             Opened::Datagram(bytes) => {
-                self.note_heard(now, from);
+                self.addresses.note(now, from);
                 return Some(bytes);
             }
             Opened::Answer(bytes) => self.send(from, &bytes),
-            Opened::Proven => self.note_heard(now, from),
+            Opened::Proven => self.addresses.note(now, from),
             Opened::Notice(line) => self.consider_notice(from, &line),
             Opened::Refused(refusal) => self.refuse(now, from, packet.len(), refusal),
         }
@@ -91,7 +86,10 @@ impl Sorter {
         let kind = match refusal {
             Refusal::NotSealed => Kind::DatagramUnsealed,
             Refusal::NoKey(id) => {
-                if id > *self.keys.newest().borrow() {
+                // Anybody can write such a datagram; only those this robot speaks with anyway
+                // are asked, so that nobody can be made a target.
+                let newer = id > *self.keys.newest().borrow();
+                if newer && self.addresses.knows(now, from) {
                     self.ask(from, Begin::Now);
                 }
                 Kind::DatagramNoKey
@@ -133,16 +131,6 @@ impl Sorter {
         let _ = self.sidings.hints.try_send(KeyHint { from, begin });
     }
 
-    fn note_heard(&self, now: Instant, from: SocketAddr) {
-        let mut heard = self.heard.borrow_mut();
-        if heard.len() >= LISTENERS_MAX && !heard.contains_key(&from) {
-            heard.retain(|_, at| now.since(*at) < LISTENER_LIFE);
-        }
-        if heard.len() < LISTENERS_MAX || heard.contains_key(&from) {
-            heard.insert(from, now);
-        }
-    }
-
     fn send(&self, to: SocketAddr, bytes: &[u8]) {
         send(&self.socket, to, bytes);
     }
@@ -161,23 +149,16 @@ fn is_of_a_stream(packet: &[u8]) -> bool {
     packet.first().is_some_and(|first| first & 0xc0 != 0) && !packet.starts_with(b"SD\x01")
 }
 
-/// Tells all robots that were heard lately of each newer key, several times.
-async fn tell_of_new_keys(
-    keys: FleetKeys,
-    socket: Arc<UdpSocket>,
-    heard: Rc<RefCell<BTreeMap<SocketAddr, Instant>>>,
-) {
+/// Tells all robots that this one speaks with of each newer key, several times.
+async fn tell_of_new_keys(keys: FleetKeys, socket: Arc<UdpSocket>, addresses: Addresses) {
     let mut newest = keys.newest();
     while newest.changed().await.is_ok() {
         for _ in 0..TELLINGS {
             let line = keys.notice();
             let now = clock::now();
-            let recent = heard.borrow().clone();
-            for (to, at) in recent {
-                if now.since(at) < LISTENER_LIFE {
-                    let datagram = keys.seal().seal_notice(now, &line);
-                    send(&socket, to, &datagram);
-                }
+            for to in addresses.recent(now) {
+                let datagram = keys.seal().seal_notice(now, &line);
+                send(&socket, to, &datagram);
             }
             tokio::time::sleep(TELL_PERIOD).await;
         }

@@ -9,6 +9,7 @@ use sdr_keys::seal::OVERHEAD_BYTES;
 use tokio::net::UdpSocket;
 use tokio::sync::mpsc;
 
+use super::addresses::Addresses;
 use super::keys::FleetKeys;
 use super::sealed::{self, Sidings, Sorter};
 use crate::clock;
@@ -24,7 +25,7 @@ const PACKET_BYTES_MAX: usize = 1500;
 #[derive(Debug)]
 pub(crate) struct Mesh {
     socket: Arc<UdpSocket>,
-    keys: Option<FleetKeys>,
+    keys: Option<(FleetKeys, Addresses)>,
 }
 
 impl Mesh {
@@ -41,9 +42,9 @@ impl Mesh {
         inputs: mpsc::Sender<Input>,
         trouble: Trouble,
     ) -> Self {
-        let own = keys.as_ref().map(|(keys, _)| keys.clone());
         let sorter = keys
             .map(|(keys, sidings)| Sorter::start(keys, socket.clone(), sidings, trouble.clone()));
+        let own = sorter.as_ref().map(|sorter| (sorter.keys.clone(), sorter.addresses.clone()));
         let ear = Ear { socket: socket.clone(), sorter, inputs, trouble };
         tokio::task::spawn_local(ear.listen());
         Self { socket, keys: own }
@@ -58,8 +59,10 @@ impl Mesh {
     pub(crate) fn send(&self, to: SocketAddr, bytes: &[u8]) {
         assert!(bytes.len() <= DATAGRAM_BYTES_MAX, "the brain bounds its datagrams");
         match &self.keys {
-            Some(keys) => {
-                let datagram = keys.seal().seal(clock::now(), bytes);
+            Some((keys, addresses)) => {
+                let now = clock::now();
+                addresses.note(now, to);
+                let datagram = keys.seal().seal(now, bytes);
                 sealed::send(&self.socket, to, &datagram);
             }
             None => sealed::send(&self.socket, to, bytes),
