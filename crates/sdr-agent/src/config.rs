@@ -43,8 +43,8 @@ pub(crate) fn memory_capacity(config: &RobotConfig) -> Bytes {
     config.capacity.memory.unwrap_or_else(of_machine)
 }
 
-/// The brain's, but for where the mesh listens.
-pub(crate) fn brain(config: &RobotConfig) -> BrainConfig {
+/// The brain's, but for where the mesh listens; `fleet` is the one that keys name.
+pub(crate) fn brain(config: &RobotConfig, fleet: Option<&str>) -> BrainConfig {
     let facts = RobotFacts {
         memory_capacity: memory_capacity(config),
         cpu_capacity: config.capacity.cpu.unwrap_or_else(host::cpu),
@@ -56,7 +56,7 @@ pub(crate) fn brain(config: &RobotConfig) -> BrainConfig {
         version: env!("CARGO_PKG_VERSION").into(),
     };
     BrainConfig {
-        fleet: config.mesh.fleet.clone(),
+        fleet: fleet.or(config.mesh.fleet.as_deref()).unwrap_or("fleet").into(),
         seeds: config.mesh.seeds.clone(),
         seed: OsRng.try_next_u64().expect("the kernel always has randomness after boot"),
         gossip_period: config.mesh.gossip_period,

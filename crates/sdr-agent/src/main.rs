@@ -10,6 +10,7 @@
 //! All decisions are made by [`sdr_core::brain::Brain`]; nothing here decides.
 
 mod api;
+mod blobs;
 mod clock;
 mod config;
 mod data;

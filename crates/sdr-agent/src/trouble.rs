@@ -25,6 +25,26 @@ pub(crate) enum Kind {
     DatagramForeign,
     /// A datagram that brought nothing new, in a second in which most did.
     DatagramStale,
+    /// A datagram without a seal, where the mesh has keys.
+    DatagramUnsealed,
+    /// A datagram sealed with a key that is not here.
+    DatagramNoKey,
+    /// A datagram sealed with a key that a rotation retired.
+    DatagramRetiredKey,
+    /// A datagram whose seal is broken.
+    DatagramForged,
+    /// A datagram that came before.
+    DatagramReplayed,
+    /// A datagram of a sender that did not prove to live: recorded in the past.
+    DatagramUnproven,
+    /// A statement that the fleet's authority did not sign.
+    NoticeForged,
+    /// A certificate that is not let in.
+    CertificateRefused,
+    /// A key that is none, or that its papers do not name.
+    KeyRefused,
+    /// A request that its operator's role does not allow.
+    ApiForbidden,
     /// A line on the components' socket that is none of the protocol.
     ComponentLine,
     /// A greeting on the components' socket by somebody who was not started by this agent.
@@ -46,6 +66,16 @@ impl Kind {
             Self::DatagramMalformed => "datagrams_malformed",
             Self::DatagramForeign => "datagrams_foreign",
             Self::DatagramStale => "datagrams_stale",
+            Self::DatagramUnsealed => "datagrams_unsealed",
+            Self::DatagramNoKey => "datagrams_no_key",
+            Self::DatagramRetiredKey => "datagrams_retired_key",
+            Self::DatagramForged => "datagrams_forged",
+            Self::DatagramReplayed => "datagrams_replayed",
+            Self::DatagramUnproven => "datagrams_unproven",
+            Self::NoticeForged => "notices_forged",
+            Self::CertificateRefused => "certificates_refused",
+            Self::KeyRefused => "keys_refused",
+            Self::ApiForbidden => "api_requests_forbidden",
             Self::ComponentLine => "component_lines_bad",
             Self::ComponentHello => "component_hellos_refused",
             Self::SensorType => "sensor_ports_mistyped",

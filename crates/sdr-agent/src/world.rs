@@ -18,11 +18,17 @@ use thiserror::Error;
 use tokio::sync::mpsc;
 
 use crate::api::{self, AnswerDesk, Api, ApiError, ApiState, LatestPlan, Profiles, Question};
+use crate::blobs::{BlobStore, StoreError, Streams, StreamsError};
 use crate::data::{Data, DataConfig, DataError};
 use crate::effects::Effects;
 use crate::events::Events;
 use crate::installed::Installed;
-use crate::mesh::{udp::Mesh, watch::MeshWatch};
+use crate::mesh::{
+    keys::{FleetKeys, KeysRefused},
+    sealed::Sidings,
+    udp::Mesh,
+    watch::MeshWatch,
+};
 use crate::metrics::{Metrics, SensorPorts, Watch};
 use crate::record::{self, RecordSender, Recorder, RecorderNews};
 use crate::store::{self, Remembered, Store};
@@ -35,6 +41,12 @@ use crate::{clock, config, memory};
 const INPUTS_MAX: usize = 4096;
 /// Questions that may wait for the loop.
 const QUESTIONS_MAX: usize = 16;
+/// Packets of streams that may wait for the QUIC library.
+const PACKETS_MAX: usize = 512;
+/// Hints at newer keys that may wait to be followed.
+const HINTS_MAX: usize = 16;
+/// What blobs may take on the disk, all together.
+const BLOBS_BYTES_MAX: u64 = 512 << 20;
 
 /// Why the agent does not start. Nothing was changed on the robot; the operator can mend it.
 #[derive(Debug, Error)]
@@ -53,6 +65,15 @@ pub(crate) enum StartError {
         /// What the system said.
         source: io::Error,
     },
+    /// The keys of robot.toml cannot be used.
+    #[error("{0}")]
+    Keys(#[from] KeysRefused),
+    /// Streams do not start.
+    #[error("{0}")]
+    Streams(#[from] StreamsError),
+    /// There is no place for blobs.
+    #[error("blobs: {0}")]
+    Blobs(#[from] StoreError),
     /// The data plane does not start.
     #[error("{0}")]
     Data(#[from] DataError),
@@ -110,11 +131,11 @@ impl World {
         let (asker, questions) = mpsc::channel(QUESTIONS_MAX);
         let trouble = Trouble::new(ground.events.clone());
 
-        let address = robot.mesh.listen;
-        let mesh = Mesh::start(address, sender.clone(), trouble.clone())
-            .await
-            .map_err(|source| StartError::Mesh { address, source })?;
-        let mut brain_config = config::brain(robot);
+        let keys = FleetKeys::open(robot, &ground.events, &trouble)?;
+        let remote = api::open_remote(robot.api.listen).await?;
+        let (mesh, streams) = start_mesh(robot, keys.clone(), sender.clone(), &trouble).await?;
+        let fleet = keys.as_ref().map(|keys| keys.identity().fleet());
+        let mut brain_config = config::brain(robot, fleet);
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
         let facts = brain_config.facts.clone();
         let installed = Installed::new(config::component_path(robot), facts, sender.clone());
@@ -150,8 +171,10 @@ impl World {
             installed: installed.clone(),
             recording: ground.recorder.as_ref().map(Recorder::flusher),
             profiles: Profiles::new(config::component_path(robot)),
+            keys: keys.clone(),
+            streams,
         };
-        let api = Api::start(robot.api.socket.clone(), listener, api_state);
+        let api = Api::start(robot.api.socket.clone(), listener, remote, api_state);
         installed.watch();
         let events = ground.events;
         let effects = Effects { mesh, store, supervisor, data, desk, events, plan, inputs: sender };
@@ -159,7 +182,7 @@ impl World {
             inputs,
             questions,
             effects,
-            mesh_watch: MeshWatch::new(trouble),
+            mesh_watch: MeshWatch::new(trouble, keys),
             api,
             metrics,
             recorder: ground.recorder,
@@ -199,6 +222,29 @@ impl World {
             OnAgentDeath::Stop => memory::clean(&self.memory),
         }
     }
+}
+
+/// Opens the one port of the mesh; with keys it carries streams too.
+async fn start_mesh(
+    robot: &RobotConfig,
+    keys: Option<FleetKeys>,
+    inputs: mpsc::Sender<Input>,
+    trouble: &Trouble,
+) -> Result<(Mesh, Option<Streams>), StartError> {
+    let address = robot.mesh.listen;
+    let socket = Mesh::open(address).await;
+    let socket = socket.map_err(|source| StartError::Mesh { address, source })?;
+    let Some(keys) = keys else {
+        return Ok((Mesh::start(socket, None, inputs, trouble.clone()), None));
+    };
+    let (stream_sender, packets) = mpsc::channel(PACKETS_MAX);
+    let (hint_sender, hints) = mpsc::channel(HINTS_MAX);
+    let store = BlobStore::open(robot.storage.state.join("blobs"), BLOBS_BYTES_MAX)?;
+    let streams = Streams::start(socket.clone(), packets, keys.clone(), store)?;
+    streams.follow_hints(hints);
+    let sidings = Sidings { streams: stream_sender, hints: hint_sender };
+    let mesh = Mesh::start(socket, Some((keys, sidings)), inputs, trouble.clone());
+    Ok((mesh, Some(streams)))
 }
 
 /// Reads what was remembered and clears what a predecessor left.

@@ -1,7 +1,7 @@
 //! `sdr`, the operator's tool: one sentence in, one request to an agent, one answer out.
 //!
 //! ```text
-//!  arguments ─▶ command/x ─▶ client ─ HTTP + JSON ─▶ sdr-agent's Unix socket
+//!  arguments ─▶ command/x ─▶ client ─ HTTP + JSON ─▶ sdr-agent: Unix socket, or TLS
 //!                   │           │
 //!                   ▼           ▼ views of sdr_core::api
 //!                render ─▶ output ─▶ stdout, stderr
@@ -19,12 +19,12 @@ mod output;
 mod render;
 mod report;
 
-use std::process::ExitCode;
+use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 
 use crate::{
-    command::{completions, deploy, events, logs, sim, status, undeploy, validate},
+    command::{completions, deploy, events, keys, logs, sim, status, undeploy, validate},
     failure::Failure,
     output::{Format, Output},
 };
@@ -33,6 +33,8 @@ use crate::{
 pub(crate) struct Session {
     /// `--agent` or `SDR_AGENT`.
     pub(crate) agent: Option<String>,
+    /// `--keys` or `SDR_KEYS`: for agents of other machines.
+    pub(crate) keys: Option<PathBuf>,
     /// Where answers go, and in which form.
     pub(crate) output: Output,
 }
@@ -41,9 +43,14 @@ pub(crate) struct Session {
 #[derive(Debug, Parser)]
 #[command(name = "sdr", version, max_term_width = 80)]
 struct Cli {
-    /// Unix socket of the agent to ask [default: /run/sdr/agent.sock]
+    /// Agent to ask: a Unix socket, or HOST:PORT with --keys
+    /// [default: /run/sdr/agent.sock]
     #[arg(long, global = true, env = "SDR_AGENT", value_name = "ADDRESS", hide_env_values = true)]
     agent: Option<String>,
+    /// Folder of an operator's keys, for agents of other machines
+    /// [default: sdr/keys below ~/.config]
+    #[arg(long, global = true, env = "SDR_KEYS", value_name = "DIR", hide_env_values = true)]
+    keys: Option<PathBuf>,
     /// Text for people, or JSON alone on stdout
     #[arg(short, long, global = true, value_enum, default_value_t)]
     output: Format,
@@ -65,6 +72,8 @@ enum Command {
     Events(events::EventsArgs),
     /// Show what a component wrote
     Logs(logs::LogsArgs),
+    /// Make, give out and take back the fleet's keys
+    Keys(keys::KeysArgs),
     /// Make a report from the agents' recordings
     Report(report::ReportArgs),
     /// Run three robots, five components and one move on this machine
@@ -77,7 +86,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let session = Session { agent: cli.agent, output: Output::new(cli.output) };
+    let session = Session { agent: cli.agent, keys: cli.keys, output: Output::new(cli.output) };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let ended = match runtime {
         Ok(runtime) => runtime.block_on(run(cli.command, &session)),
@@ -94,6 +103,7 @@ async fn run(command: Command, session: &Session) -> Result<ExitCode, Failure> {
         Command::Status(args) => status::run(args, session).await,
         Command::Events(args) => events::run(args, session).await,
         Command::Logs(args) => logs::run(args, session).await,
+        Command::Keys(args) => keys::run(args, session).await,
         Command::Report(args) => report::run(args, session).await,
         Command::Demo(args) => demo::run(args, session).await,
         Command::Sim(args) => sim::run(args, session),

@@ -2,8 +2,9 @@
 
 use std::{
     fs,
-    io::Write,
-    os::unix::process::CommandExt,
+    io::{Read, Write},
+    net::{Ipv4Addr, TcpListener},
+    os::unix::{net::UnixStream, process::CommandExt},
     path::{Path, PathBuf},
     process::{Child, Command, Output, Stdio},
 };
@@ -22,6 +23,8 @@ pub struct Agent {
     pub folder: PathBuf,
     /// Where its mesh listens.
     pub port: u16,
+    /// Where its API listens for operators of other machines.
+    pub api_port: u16,
     programs: &'static Programs,
     process: Option<Child>,
 }
@@ -30,13 +33,14 @@ impl Agent {
     pub(super) fn new(fleet: &Path, name: &str, programs: &'static Programs) -> Self {
         let folder = fleet.join(name.replace("robot-", "r"));
         fs::create_dir_all(&folder).expect("a folder");
-        Self { name: name.into(), folder, port: 0, programs, process: None }
+        Self { name: name.into(), folder, port: 0, api_port: 0, programs, process: None }
     }
 
     /// Writes robot.toml.
     pub(super) fn configure(&mut self, number: usize, ports: &[u16], domain: u16, world: &Path) {
         self.port = ports[number];
         let body = RobotPaths::new(world, &self.name);
+        self.api_port = free_tcp_port();
         let others = ports.iter().filter(|port| **port != self.port);
         let seeds: Vec<String> = others.map(|port| format!("\"127.0.0.1:{port}\"")).collect();
         let text = format!(
@@ -47,8 +51,8 @@ devices = {{ fisheye = {fisheye:?}, camera = {camera:?}, wheels = {wheels:?} }}
 memory = "1.9GB"
 cpu = "400%"
 [mesh]
-unsealed = true
-fleet = "house-{first}"
+keys = {keys:?}
+key_grace = "3s"
 listen = "127.0.0.1:{port}"
 seeds = [{seeds}]
 gone_after = "4s"
@@ -62,6 +66,7 @@ path = [{scripts:?}, {programs:?}]
 domain_id = {domain}
 [api]
 socket = {socket:?}
+listen = "127.0.0.1:{api_port}"
 [storage]
 state = {state:?}
 "#,
@@ -69,7 +74,8 @@ state = {state:?}
             fisheye = body.fisheye,
             camera = body.camera,
             wheels = body.wheels,
-            first = ports[0],
+            keys = self.keys(),
+            api_port = self.api_port,
             port = self.port,
             seeds = seeds.join(", "),
             wireless = body.wireless,
@@ -125,6 +131,12 @@ state = {state:?}
         command.output().expect("sdr runs")
     }
 
+    /// Runs `sdr ARGUMENTS`, which name the agent.
+    pub fn sdr_anywhere(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(self.programs.sdr());
+        command.args(arguments).env("NO_COLOR", "1").output().expect("sdr runs")
+    }
+
     /// What it believes; `None` while it does not answer.
     pub fn status(&self) -> Option<StatusView> {
         let output = self.sdr(&["status", "-o", "json"]);
@@ -163,6 +175,29 @@ state = {state:?}
         self.folder.join("a.sock")
     }
 
+    /// Its folder of keys.
+    pub fn keys(&self) -> PathBuf {
+        self.folder.join("keys")
+    }
+
+    /// `GET /v1/health`.
+    pub fn health(&self) -> serde_json::Value {
+        let ask = || -> std::io::Result<String> {
+            let mut stream = UnixStream::connect(self.socket())?;
+            stream.write_all(b"GET /v1/health HTTP/1.0\r\nHost: x\r\n\r\n")?;
+            let mut answer = String::new();
+            stream.read_to_string(&mut answer)?;
+            Ok(answer)
+        };
+        let answer = ask().unwrap_or_default();
+        serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap_or("")).unwrap_or_default()
+    }
+
+    /// How much bad input of this kind it counted.
+    pub fn bad_input(&self, kind: &str) -> u64 {
+        self.health()["bad_input"][kind].as_u64().unwrap_or(0)
+    }
+
     /// Its state folder.
     pub fn state(&self) -> PathBuf {
         self.folder.join("state")
@@ -193,6 +228,12 @@ impl Drop for Agent {
     fn drop(&mut self) {
         self.stop();
     }
+}
+
+/// A TCP port of loopback that is free now.
+fn free_tcp_port() -> u16 {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
+    listener.local_addr().expect("bound").port()
 }
 
 /// Whether a process of this id runs; one that ended and was not collected yet does not.

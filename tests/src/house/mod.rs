@@ -36,6 +36,16 @@ pub struct House {
 impl House {
     /// A fleet of `count` robots that see each other and have a coordinator.
     pub fn start(count: usize) -> Self {
+        let mut house = Self::build(count);
+        house.agents.iter_mut().for_each(Agent::start);
+        house.wait("a fleet with a coordinator", |house| {
+            (0..count).all(|number| house.sees(number, count))
+        });
+        house
+    }
+
+    /// As [`House::start`], and no agent is started yet.
+    pub fn build(count: usize) -> Self {
         let programs = programs();
         let folder = tempfile::Builder::new().prefix("sdr").tempdir().expect("a folder");
         let names: Vec<String> = (1..=3).map(|number| format!("robot-{number}")).collect();
@@ -48,17 +58,39 @@ impl House {
             agent.configure(number, &ports, domain, folder.path());
             agents.push(agent);
         }
-        let mut house = Self { agents, world, folder };
-        house.agents.iter_mut().for_each(Agent::start);
-        house.wait("a fleet with a coordinator", |house| {
-            (0..count).all(|number| {
-                house.status(number).is_some_and(|status| {
-                    status.coordinator.is_some()
-                        && status.robots.iter().filter(|robot| robot.alive).count() == count
-                })
-            })
-        });
+        let house = Self { agents, world, folder };
+        house.keys(&["init", "--fleet", "house"]);
+        for agent in &house.agents {
+            let out = agent.keys();
+            house.keys(&["add", &agent.name, "--out", out.to_str().expect("a plain path")]);
+        }
         house
+    }
+
+    /// Gives an agent that was not started a seed that is none of the house.
+    pub fn add_seed(&mut self, number: usize, port: u16) {
+        let file = self.agents[number].folder.join("robot.toml");
+        let text = std::fs::read_to_string(&file).expect("it was written");
+        let seeds = format!("seeds = [\"127.0.0.1:{port}\", ");
+        std::fs::write(&file, text.replacen("seeds = [", &seeds, 1)).expect("it is written");
+    }
+
+    /// Whether that agent sees `count` living robots and a coordinator.
+    pub fn sees(&self, number: usize, count: usize) -> bool {
+        self.status(number).is_some_and(|status| {
+            status.coordinator.is_some()
+                && status.robots.iter().filter(|robot| robot.alive).count() == count
+        })
+    }
+
+    /// Runs `sdr keys ARGUMENTS -o json` with the authority of this house.
+    pub fn keys(&self, arguments: &[&str]) -> serde_json::Value {
+        let mut command = std::process::Command::new(programs().sdr());
+        command.args(["-o", "json", "keys", "--authority"]).arg(self.folder().join("authority"));
+        let output = command.args(arguments).output().expect("sdr runs");
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "sdr keys {arguments:?}: {told}");
+        serde_json::from_slice(&output.stdout).expect("JSON alone")
     }
 
     /// Waits until `done`; panics with all logs when it takes too long.

@@ -54,8 +54,7 @@ fn garbage_on_every_door_disturbs_nobody() {
     for agent in &house.agents {
         house.wait("all of it counted", |_| {
             let health = health(agent);
-            health["mesh"]["malformed"].as_u64() >= Some(4)
-                && health["bad_input"]["datagrams_oversized"].as_u64() >= Some(2)
+            health["bad_input"]["datagrams_unsealed"].as_u64() >= Some(7)
                 && health["bad_input"]["component_lines_bad"].as_u64() >= Some(1)
         });
     }

@@ -15,11 +15,13 @@ const ABOVE_ALL: [&str; 2] = ["sdr-tests", "sdr-benches"];
 fn may_know(name: &str) -> &'static [&'static str] {
     match name {
         "sdr-core" => &[],
-        "sdr-alloc" | "sdr-recovery" | "sdr-component" => &["sdr-core"],
+        "sdr-alloc" | "sdr-recovery" | "sdr-component" | "sdr-keys" => &["sdr-core"],
         "sdr-lab" => &["sdr-core", "sdr-alloc", "sdr-recovery"],
         "sdr-files" => &["sdr-core", "sdr-alloc", "sdr-recovery"],
-        "sdr-agent" => &["sdr-core", "sdr-alloc", "sdr-recovery", "sdr-files", "sdr-component"],
-        "sdr-cli" => &["sdr-core", "sdr-alloc", "sdr-recovery", "sdr-files", "sdr-lab"],
+        "sdr-agent" => {
+            &["sdr-core", "sdr-alloc", "sdr-recovery", "sdr-files", "sdr-component", "sdr-keys"]
+        }
+        "sdr-cli" => &["sdr-core", "sdr-alloc", "sdr-recovery", "sdr-files", "sdr-lab", "sdr-keys"],
         "sdr-components" => &["sdr-core", "sdr-component", "sdr-lab"],
         stranger => {
             panic!("{stranger} is new: say here whom it may know, and why in docs/decisions")

@@ -1,14 +1,20 @@
-//! HTTP and JSON on a Unix socket, for `sdr` and for programs on this robot.
+//! HTTP and JSON: on a Unix socket for `sdr` and programs on this robot, over TLS for operators
+//! of other machines.
 
 mod answer;
+mod blobs;
 mod components;
+mod connection;
 mod deploy;
 mod events;
+mod keys;
 mod logs;
+mod remote;
 mod role;
 mod views;
 
 use std::collections::BTreeMap;
+use std::net::SocketAddr;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -24,13 +30,15 @@ use sdr_core::{
     mesh::MeshCounters,
 };
 use thiserror::Error;
-use tokio::net::{UnixListener, UnixStream};
+use tokio::net::{TcpListener, UnixListener, UnixStream};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 
+use crate::blobs::{BLOB_BYTES_MAX, Streams};
 use crate::data::Ledger;
 use crate::events::Events;
 use crate::installed::Installed;
+use crate::mesh::keys::FleetKeys;
 use crate::record::Flusher;
 use crate::supervisor::LogFiles;
 use crate::trouble::Trouble;
@@ -65,6 +73,10 @@ pub(crate) struct ApiState {
     /// `None` when nothing is recorded.
     pub(crate) recording: Option<Flusher>,
     pub(crate) profiles: Profiles,
+    /// `None` when the mesh is plain.
+    pub(crate) keys: Option<FleetKeys>,
+    /// `None` when the mesh is plain.
+    pub(crate) streams: Option<Streams>,
 }
 
 /// The plan that was made last, empty before the first.
@@ -88,6 +100,14 @@ pub(crate) enum ApiError {
     /// An agent runs on this robot already.
     #[error("{}: another agent answers there; one robot has one agent", .0.display())]
     Taken(PathBuf),
+    /// The port for other machines cannot be had.
+    #[error("listen at {address}: {source}")]
+    Listen {
+        /// From robot.toml.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
     /// The system refused.
     #[error("{}: {source}", path.display())]
     Socket {
@@ -103,22 +123,34 @@ pub(crate) enum ApiError {
 pub(crate) struct Api {
     path: PathBuf,
     server: JoinHandle<()>,
+    remote: Option<JoinHandle<()>>,
 }
 
 impl Api {
-    /// Serves requests on `listener`, which was opened at `path`.
-    pub(crate) fn start(path: PathBuf, listener: UnixListener, state: ApiState) -> Self {
+    /// Serves requests on `listener`, which was opened at `path`, and on `remote`.
+    pub(crate) fn start(
+        path: PathBuf,
+        listener: UnixListener,
+        remote: Option<TcpListener>,
+        state: ApiState,
+    ) -> Self {
+        let keys = state.keys.clone();
+        let remote = remote.zip(keys);
+        let remote = remote.map(|(listener, keys)| remote::serve(listener, keys, state.clone()));
         let server = tokio::spawn(async move {
             if let Err(error) = axum::serve(listener, router(state)).await {
                 tracing::error!(event = "api-lost", %error, next = "restart the agent");
             }
         });
-        Self { path, server }
+        Self { path, server, remote }
     }
 
     /// Ends all connections and removes the socket.
     pub(crate) fn stop(&self) {
         self.server.abort();
+        if let Some(remote) = &self.remote {
+            remote.abort();
+        }
         if let Err(error) = fs::remove_file(&self.path) {
             tracing::debug!(event = "socket-left", path = %self.path.display(), %error);
         }
@@ -159,6 +191,15 @@ pub(crate) async fn open(path: &Path) -> Result<UnixListener, ApiError> {
     bind(path).map_err(|source| ApiError::Socket { path: path.into(), source })
 }
 
+/// Opens the port for operators of other machines, when robot.toml names one.
+pub(crate) async fn open_remote(
+    address: Option<SocketAddr>,
+) -> Result<Option<TcpListener>, ApiError> {
+    let Some(address) = address else { return Ok(None) };
+    let listener = TcpListener::bind(address).await;
+    listener.map(Some).map_err(|source| ApiError::Listen { address, source })
+}
+
 fn bind(path: &Path) -> io::Result<UnixListener> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)?;
@@ -174,6 +215,7 @@ fn bind(path: &Path) -> io::Result<UnixListener> {
 }
 
 fn router(state: ApiState) -> Router {
+    let blob_max = usize::try_from(BLOB_BYTES_MAX).unwrap_or(usize::MAX);
     Router::new()
         .route("/v1/status", get(views::status))
         .route("/v1/health", get(views::health))
@@ -186,6 +228,9 @@ fn router(state: ApiState) -> Router {
         .route("/v1/events", get(events::events))
         .route("/v1/logs/{system}/{component}", get(logs::logs))
         .route("/v1/components", get(components::components))
+        .route("/v1/keys", post(keys::keys))
+        .route("/v1/blobs", post(blobs::keep).layer(DefaultBodyLimit::max(blob_max)))
+        .route("/v1/blobs/{hash}", get(blobs::bring))
         .fallback(answer::no_such_path)
         .method_not_allowed_fallback(answer::wrong_method)
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))

@@ -44,9 +44,11 @@ impl Bench {
             logs: LogFiles { dir: dir.path().into(), each_bytes_max: 1 << 20, bytes_max: 1 << 20 },
             recording: None,
             profiles: Profiles::new(bin),
+            keys: None,
+            streams: None,
         };
         let listener = open(&path).await.unwrap();
-        let api = Api::start(path, listener, state.clone());
+        let api = Api::start(path, listener, None, state.clone());
         Self { dir, api, state, inputs, questions }
     }
 

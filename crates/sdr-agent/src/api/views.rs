@@ -16,7 +16,9 @@ use tokio::sync::oneshot;
 
 use super::answer::Refusal;
 use super::{ApiState, Question};
+use crate::clock;
 use crate::data::Way;
+use crate::mesh::keys::FleetKeys;
 
 /// `GET /v1/health`.
 #[derive(Debug, Serialize)]
@@ -31,6 +33,8 @@ pub(super) struct HealthView {
     bad_input: BTreeMap<String, u64>,
     /// What the mesh counted.
     mesh: MeshView,
+    /// Keys of the mesh; null when it is plain.
+    keys: Option<KeysView>,
     /// What crossed this robot's border.
     routes: Vec<RouteView>,
 }
@@ -45,6 +49,18 @@ struct MeshView {
     refused: u64,
     sent: u64,
     sent_bytes: u64,
+}
+
+/// Keys, and what the seal counted since the agent's start.
+#[derive(Debug, Serialize)]
+struct KeysView {
+    fleet: String,
+    newest: u16,
+    seals_with: u16,
+    denied: usize,
+    opened: u64,
+    proven: u64,
+    refused: BTreeMap<&'static str, u64>,
 }
 
 /// Counters of one route since it was made.
@@ -92,6 +108,7 @@ pub(super) async fn health(State(state): State<ApiState>) -> Result<Json<HealthV
         pid: std::process::id(),
         bad_input: state.trouble.counters(),
         mesh: mesh_view(&counted),
+        keys: state.keys.as_ref().map(keys_view),
         routes: routes.collect(),
     }))
 }
@@ -99,6 +116,31 @@ pub(super) async fn health(State(state): State<ApiState>) -> Result<Json<HealthV
 fn mesh_view(counted: &MeshCounters) -> MeshView {
     let MeshCounters { received, malformed, foreign, stale, refused, sent, sent_bytes } = *counted;
     MeshView { received, malformed, foreign, stale, refused, sent, sent_bytes }
+}
+
+fn keys_view(keys: &FleetKeys) -> KeysView {
+    let counted = keys.counters();
+    let newest = keys.newest().borrow().0;
+    let seals_with = keys.seal().keyring().seals_with(clock::now()).0;
+    let refused = [
+        ("not_sealed", counted.not_sealed),
+        ("no_key", counted.no_key),
+        ("retired", counted.retired),
+        ("forged", counted.forged),
+        ("replayed", counted.replayed),
+        ("unproven", counted.unproven),
+        ("stray", counted.stray),
+        ("own", counted.own),
+    ];
+    KeysView {
+        fleet: keys.identity().fleet().into(),
+        newest,
+        seals_with,
+        denied: keys.denied(),
+        opened: counted.opened,
+        proven: counted.proven,
+        refused: refused.into_iter().collect(),
+    }
 }
 
 pub(super) async fn plan(State(state): State<ApiState>) -> Json<PlanView> {

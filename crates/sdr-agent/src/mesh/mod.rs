@@ -1,4 +1,7 @@
 //! The robot's ear and mouth for other robots.
 
+mod addresses;
+pub(crate) mod keys;
+pub(crate) mod sealed;
 pub(crate) mod udp;
 pub(crate) mod watch;

@@ -1,34 +1,53 @@
-//! One UDP socket for all datagrams of the mesh.
+//! One UDP socket for all datagrams of the mesh, and for the packets of streams.
 
 use std::io;
 use std::net::SocketAddr;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use sdr_core::input::Input;
+use sdr_keys::seal::OVERHEAD_BYTES;
 use tokio::net::UdpSocket;
 use tokio::sync::mpsc;
 
+use super::addresses::Addresses;
+use super::keys::FleetKeys;
+use super::sealed::{self, Sidings, Sorter};
+use crate::clock;
 use crate::trouble::{Kind, Trouble};
 
-/// Largest datagram of the mesh, bytes; it passes every link without fragments.
+/// Largest datagram of the mesh, bytes; sealed and with its IPv6 headers it has 1280, which
+/// passes every link without fragments.
 pub(crate) const DATAGRAM_BYTES_MAX: usize = 1200;
+/// Largest packet that is read: what a link of Ethernet's size carries.
+const PACKET_BYTES_MAX: usize = 1500;
 
 /// Sends datagrams; a task reads those that come.
 #[derive(Debug)]
 pub(crate) struct Mesh {
-    socket: Rc<UdpSocket>,
+    socket: Arc<UdpSocket>,
+    keys: Option<(FleetKeys, Addresses)>,
 }
 
 impl Mesh {
-    /// Listens at `address` and hands every datagram in. Call within a `LocalSet`.
-    pub(crate) async fn start(
-        address: SocketAddr,
+    /// A socket at `address`, which nobody reads yet.
+    pub(crate) async fn open(address: SocketAddr) -> io::Result<Arc<UdpSocket>> {
+        UdpSocket::bind(address).await.map(Arc::new)
+    }
+
+    /// Hands every datagram in: opened with the keys, or plain when there are none. Call
+    /// within a `LocalSet`.
+    pub(crate) fn start(
+        socket: Arc<UdpSocket>,
+        keys: Option<(FleetKeys, Sidings)>,
         inputs: mpsc::Sender<Input>,
         trouble: Trouble,
-    ) -> io::Result<Self> {
-        let socket = Rc::new(UdpSocket::bind(address).await?);
-        tokio::task::spawn_local(listen(Rc::clone(&socket), inputs, trouble));
-        Ok(Self { socket })
+    ) -> Self {
+        let sorter = keys
+            .map(|(keys, sidings)| Sorter::start(keys, socket.clone(), sidings, trouble.clone()));
+        let own = sorter.as_ref().map(|sorter| (sorter.keys.clone(), sorter.addresses.clone()));
+        let ear = Ear { socket: socket.clone(), sorter, inputs, trouble };
+        tokio::task::spawn_local(ear.listen());
+        Self { socket, keys: own }
     }
 
     /// Where others reach this robot.
@@ -39,38 +58,61 @@ impl Mesh {
     /// Sends once, without waiting: gossip repairs what a full socket buffer drops.
     pub(crate) fn send(&self, to: SocketAddr, bytes: &[u8]) {
         assert!(bytes.len() <= DATAGRAM_BYTES_MAX, "the brain bounds its datagrams");
-        if let Err(error) = self.socket.try_send_to(bytes, to) {
-            tracing::debug!(event = "datagram-not-sent", %to, %error);
+        match &self.keys {
+            Some((keys, addresses)) => {
+                let now = clock::now();
+                addresses.note(now, to);
+                let datagram = keys.seal().seal(now, bytes);
+                sealed::send(&self.socket, to, &datagram);
+            }
+            None => sealed::send(&self.socket, to, bytes),
         }
     }
 }
 
-async fn listen(socket: Rc<UdpSocket>, inputs: mpsc::Sender<Input>, trouble: Trouble) {
-    // One byte more than allowed, so that an oversized datagram is seen as such.
-    let mut buffer = [0_u8; DATAGRAM_BYTES_MAX + 1];
-    loop {
-        let (length, from) = match socket.recv_from(&mut buffer).await {
-            Ok(received) => received,
-            // A peer's port was closed; the socket itself is fine.
-            Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => continue,
-            Err(error) => {
-                tracing::error!(event = "mesh-lost", %error, next = "retry in 1 s");
-                tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+/// Reads the socket.
+struct Ear {
+    socket: Arc<UdpSocket>,
+    /// `None` when datagrams are plain.
+    sorter: Option<Sorter>,
+    inputs: mpsc::Sender<Input>,
+    trouble: Trouble,
+}
+
+impl Ear {
+    async fn listen(self) {
+        let mut buffer = [0_u8; PACKET_BYTES_MAX];
+        loop {
+            let (length, from) = match self.socket.recv_from(&mut buffer).await {
+                Ok(received) => received,
+                // A peer's port was closed; the socket itself is fine.
+                Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => continue,
+                Err(error) => {
+                    tracing::error!(event = "mesh-lost", %error, next = "retry in 1 s");
+                    tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+                    continue;
+                }
+            };
+            let bytes = match &self.sorter {
+                Some(sorter) => sorter.sort(from, &buffer[..length]),
+                None => Some(buffer[..length].to_vec()),
+            };
+            let Some(bytes) = bytes else { continue };
+            if bytes.len() > DATAGRAM_BYTES_MAX {
+                let said = format!("datagram from {from} over {DATAGRAM_BYTES_MAX} bytes");
+                self.trouble.count(Kind::DatagramOversized, &said);
                 continue;
             }
-        };
-        if length > DATAGRAM_BYTES_MAX {
-            let said = format!("datagram from {from} over {DATAGRAM_BYTES_MAX} bytes");
-            trouble.count(Kind::DatagramOversized, &said);
-            continue;
-        }
-        let datagram = Input::Datagram { from, bytes: buffer[..length].to_vec() };
-        match inputs.try_send(datagram) {
-            Ok(()) => {}
-            Err(mpsc::error::TrySendError::Full(_)) => {
-                trouble.count(Kind::DatagramUnread, &format!("datagram from {from}: loop is busy"));
+            match self.inputs.try_send(Input::Datagram { from, bytes }) {
+                Ok(()) => {}
+                Err(mpsc::error::TrySendError::Full(_)) => {
+                    let said = format!("datagram from {from}: loop is busy");
+                    self.trouble.count(Kind::DatagramUnread, &said);
+                }
+                Err(mpsc::error::TrySendError::Closed(_)) => return,
             }
-            Err(mpsc::error::TrySendError::Closed(_)) => return,
         }
     }
 }
+
+const _: () = assert!(DATAGRAM_BYTES_MAX + OVERHEAD_BYTES <= PACKET_BYTES_MAX);

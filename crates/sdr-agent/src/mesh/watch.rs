@@ -2,6 +2,7 @@
 
 use sdr_core::mesh::MeshCounters;
 
+use super::keys::FleetKeys;
 use crate::trouble::{Kind, Trouble};
 
 /// Fewer stale datagrams in a second are no flood: robots hear the same news from several
@@ -12,6 +13,8 @@ const STALE_FLOOD_MIN: u64 = 50;
 #[derive(Debug)]
 pub(crate) struct MeshWatch {
     trouble: Trouble,
+    /// `None` when datagrams are plain.
+    keys: Option<FleetKeys>,
     before: MeshCounters,
     /// Stale datagrams of all seconds that were floods.
     flooded: u64,
@@ -19,8 +22,8 @@ pub(crate) struct MeshWatch {
 
 impl MeshWatch {
     /// Speaks through `trouble`.
-    pub(crate) fn new(trouble: Trouble) -> Self {
-        Self { trouble, before: MeshCounters::default(), flooded: 0 }
+    pub(crate) fn new(trouble: Trouble, keys: Option<FleetKeys>) -> Self {
+        Self { trouble, keys, before: MeshCounters::default(), flooded: 0 }
     }
 
     /// Looks at the counters; to be called once a second.
@@ -42,6 +45,15 @@ impl MeshWatch {
         let said = format!("{stale} of the last {received} datagrams were repeated or played back");
         self.trouble.note(Kind::DatagramStale, self.flooded, &said);
         self.before = now;
+
+        if let Some(keys) = &self.keys {
+            let unanswered = keys.counters().unanswered;
+            let said = format!(
+                "{} datagrams of {} senders that did not prove to live: recorded in the past, or gone",
+                unanswered.datagrams, unanswered.starts
+            );
+            self.trouble.note(Kind::DatagramUnproven, unanswered.datagrams, &said);
+        }
     }
 }
 
@@ -56,7 +68,7 @@ mod tests {
     fn what_the_mesh_drops_is_said_with_its_counts_and_its_usual_repeats_are_not() {
         let events = Events::new(RobotId::new("robot-1").unwrap());
         let trouble = Trouble::new(events.clone());
-        let mut watch = MeshWatch::new(trouble.clone());
+        let mut watch = MeshWatch::new(trouble.clone(), None);
         let quiet = MeshCounters { received: 200, stale: 90, ..MeshCounters::default() };
         watch.look(quiet);
         assert!(trouble.counters().is_empty());

@@ -1,6 +1,6 @@
 //! Why there is no answer, in words that say what to do next.
 
-use std::{fmt::Display, io, path::PathBuf};
+use std::{fmt::Display, io};
 
 use sdr_core::api::ErrorAnswer;
 use thiserror::Error;
@@ -16,32 +16,47 @@ const SHOWN_MAX: usize = 60;
 pub(crate) enum ClientError {
     /// Nobody listens; the operator starts an agent or names another.
     #[error(
-        "no agent at {} ({source})\n  The agent is not running here.  Start it:   sudo systemctl start sdr-agent\n  Or ask another one on this machine:         sdr --agent SOCKET ...",
-        socket.display()
+        "no agent at {agent} ({source})\n  The agent is not running here.  Start it:   sudo systemctl start sdr-agent\n  Or ask another one on this machine:         sdr --agent SOCKET ..."
     )]
     Absent {
         /// Where it was looked for.
-        socket: PathBuf,
+        agent: String,
         /// What the system said.
         source: io::Error,
     },
     /// The socket belongs to others; the operator joins their group.
     #[error(
-        "the agent at {} may not be asked by this user\n  Its socket is open to its own user and group.  Join the group:   sudo usermod -aG sdr $USER",
-        socket.display()
+        "the agent at {agent} may not be asked by this user\n  Its socket is open to its own user and group.  Join the group:   sudo usermod -aG sdr $USER"
     )]
     Denied {
-        /// The socket.
-        socket: PathBuf,
+        /// The agent that was asked.
+        agent: String,
+    },
+    /// Nobody listens at another robot's address.
+    #[error(
+        "no agent at {agent} ({source})\n  It is off, out of reach, or its robot.toml has no [api] listen with this port."
+    )]
+    Unreachable {
+        /// Where it was looked for.
+        agent: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// One end refused the other's certificate.
+    #[error("{agent}: {reason}")]
+    Unwelcome {
+        /// The agent that was asked.
+        agent: String,
+        /// Which end refused whom, and why.
+        reason: String,
     },
     /// Connected, then nothing.
     #[error(
-        "the agent at {} did not answer {path} within {seconds} s\n  It is stopped or overloaded; its log says more.",
-        socket.display()
+        "the agent at {agent} did not answer {path} within {seconds} s\n  It is stopped or overloaded; its log says more."
     )]
     Silent {
-        /// The socket.
-        socket: PathBuf,
+        /// The agent that was asked.
+        agent: String,
         /// What was asked.
         path: String,
         /// How long it had.
@@ -49,12 +64,11 @@ pub(crate) enum ClientError {
     },
     /// The connection ended or carried no HTTP.
     #[error(
-        "no usable answer from {} to {path}: {reason}\n  The agent ended meanwhile, or that is no agent's socket.",
-        socket.display()
+        "no usable answer from {agent} to {path}: {reason}\n  The agent ended meanwhile, or that is no agent's socket."
     )]
     Broken {
-        /// The socket.
-        socket: PathBuf,
+        /// The agent that was asked.
+        agent: String,
         /// What was asked.
         path: String,
         /// What went wrong.
@@ -62,12 +76,11 @@ pub(crate) enum ClientError {
     },
     /// HTTP, but not what was expected.
     #[error(
-        "the answer from {} to {path} cannot be read: {reason}\n  It begins: {start}\n  Are sdr and sdr-agent of one version?   sdr --version; sdr-agent --version",
-        socket.display()
+        "the answer from {agent} to {path} cannot be read: {reason}\n  It begins: {start}\n  Are sdr and sdr-agent of one version?   sdr --version; sdr-agent --version"
     )]
     Nonsense {
-        /// The socket.
-        socket: PathBuf,
+        /// The agent that was asked.
+        agent: String,
         /// What was asked.
         path: String,
         /// What does not fit.
@@ -108,8 +121,8 @@ impl ClientError {
             true => "(nothing)".into(),
             false => shown.collect(),
         };
-        let socket = client.socket().to_path_buf();
-        Self::Nonsense { socket, path: path.into(), reason: reason.to_string(), start }
+        let agent = client.agent();
+        Self::Nonsense { agent, path: path.into(), reason: reason.to_string(), start }
     }
 }
 
@@ -119,6 +132,8 @@ impl From<ClientError> for Failure {
             ClientError::Refused { answer, .. } => Self::Failed(answer),
             ClientError::Absent { .. }
             | ClientError::Denied { .. }
+            | ClientError::Unreachable { .. }
+            | ClientError::Unwelcome { .. }
             | ClientError::Silent { .. }
             | ClientError::Broken { .. }
             | ClientError::Nonsense { .. }

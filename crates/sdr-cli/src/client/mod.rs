@@ -1,14 +1,12 @@
-//! The client of an agent's API: HTTP/1.1 and JSON over a Unix socket, one connection a request.
+//! The client of an agent's API: HTTP/1.1 and JSON over a Unix socket or TLS, one connection a
+//! request.
 
 mod address;
+mod connect;
 mod error;
 mod stream;
 
-use std::{
-    io,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::{path::PathBuf, time::Duration};
 
 use http_body_util::{BodyExt, Full, LengthLimitError, Limited};
 use hyper::{
@@ -20,8 +18,10 @@ use hyper::{
 use hyper_util::rt::TokioIo;
 use sdr_core::api::ErrorAnswer;
 use serde::{Serialize, de::DeserializeOwned};
-use tokio::{net::UnixStream, time::timeout};
+use tokio::time::timeout;
 
+use address::Address;
+pub(crate) use address::user_folder;
 pub(crate) use error::ClientError;
 pub(crate) use stream::{Chunks, Events};
 
@@ -35,7 +35,7 @@ const HINT_WITHIN: Duration = Duration::from_secs(1);
 /// Speaks with one agent.
 #[derive(Clone, Debug)]
 pub(crate) struct Client {
-    socket: PathBuf,
+    address: Address,
     within: Duration,
 }
 
@@ -49,17 +49,21 @@ struct Call<'a> {
 impl Client {
     /// The agent at this Unix socket.
     pub(crate) fn at(socket: impl Into<PathBuf>) -> Self {
-        Self { socket: socket.into(), within: ANSWER_WITHIN }
+        Self::new(Address::Socket(socket.into()))
+    }
+
+    fn new(address: Address) -> Self {
+        Self { address, within: ANSWER_WITHIN }
     }
 
     /// The same agent, given up soon: for what is nice to know.
     pub(crate) fn hurried(&self) -> Self {
-        Self { socket: self.socket.clone(), within: HINT_WITHIN }
+        Self { address: self.address.clone(), within: HINT_WITHIN }
     }
 
     /// Where the agent is looked for.
-    pub(crate) fn socket(&self) -> &Path {
-        &self.socket
+    pub(crate) fn agent(&self) -> String {
+        self.address.to_string()
     }
 
     /// `GET path`, read as `T`.
@@ -89,7 +93,7 @@ impl Client {
         let call = Call { method: Method::GET, path, body: None };
         let (sender, response) = self.in_time(path, self.send(call)).await?;
         if response.status().is_success() {
-            return Ok(Chunks::new(sender, response.into_body(), &self.socket));
+            return Ok(Chunks::new(sender, response.into_body(), self.agent()));
         }
         let status = response.status();
         let body = self.in_time(path, self.read(path, response)).await?;
@@ -130,7 +134,7 @@ impl Client {
     ) -> Result<T, ClientError> {
         timeout(self.within, exchange).await.unwrap_or_else(|_| {
             Err(ClientError::Silent {
-                socket: self.socket.clone(),
+                agent: self.agent(),
                 path: path.into(),
                 seconds: self.within.as_secs_f64(),
             })
@@ -141,7 +145,7 @@ impl Client {
         &self,
         call: Call<'_>,
     ) -> Result<(SendRequest<Full<Bytes>>, Response<Incoming>), ClientError> {
-        let stream = UnixStream::connect(&self.socket).await.map_err(|error| self.absent(error))?;
+        let stream = self.connect().await?;
         let broken = |error: hyper::Error| self.broken(call.path, &error);
         let (mut sender, connection) =
             http1::handshake(TokioIo::new(stream)).await.map_err(broken)?;
@@ -168,22 +172,17 @@ impl Client {
         })
     }
 
-    fn absent(&self, source: io::Error) -> ClientError {
-        let socket = self.socket.clone();
-        match source.kind() == io::ErrorKind::PermissionDenied {
-            true => ClientError::Denied { socket },
-            false => ClientError::Absent { socket, source },
+    fn broken(&self, path: &str, error: &(dyn std::error::Error + 'static)) -> ClientError {
+        if let Some(refusal) = self.refusal_in(error) {
+            return refusal;
         }
-    }
-
-    fn broken(&self, path: &str, error: &dyn std::error::Error) -> ClientError {
         let mut reason = error.to_string();
         let mut cause = error.source();
         while let Some(inner) = cause {
             reason = format!("{reason}: {inner}");
             cause = inner.source();
         }
-        ClientError::Broken { socket: self.socket.clone(), path: path.into(), reason }
+        ClientError::Broken { agent: self.agent(), path: path.into(), reason }
     }
 
     fn refused(&self, path: &str, status: StatusCode, body: &Bytes) -> ClientError {

@@ -1,7 +1,5 @@
 //! Answers that come in pieces: bytes of a log, server-sent events.
 
-use std::path::{Path, PathBuf};
-
 use http_body_util::{BodyExt, Full};
 use hyper::{
     body::{Bytes, Incoming},
@@ -18,12 +16,12 @@ pub(crate) struct Chunks {
     /// Held so that the connection stays open.
     _sender: SendRequest<Full<Bytes>>,
     body: Incoming,
-    socket: PathBuf,
+    agent: String,
 }
 
 impl Chunks {
-    pub(super) fn new(sender: SendRequest<Full<Bytes>>, body: Incoming, socket: &Path) -> Self {
-        Self { _sender: sender, body, socket: socket.to_path_buf() }
+    pub(super) fn new(sender: SendRequest<Full<Bytes>>, body: Incoming, agent: String) -> Self {
+        Self { _sender: sender, body, agent }
     }
 
     /// The next bytes, or `None` at the end.
@@ -38,8 +36,8 @@ impl Chunks {
     }
 
     fn broken(&self, reason: &str) -> ClientError {
-        let socket = self.socket.clone();
-        ClientError::Broken { socket, path: "a stream".into(), reason: reason.into() }
+        let agent = self.agent.clone();
+        ClientError::Broken { agent, path: "a stream".into(), reason: reason.into() }
     }
 }
 

@@ -75,7 +75,7 @@ async fn follow(client: &Client, mut since: u64, session: &Session) -> Result<Ex
     }
     Err(Failure::new(format!(
         "the agent at {} ended the stream: it stopped or restarts",
-        client.socket().display()
+        client.agent()
     )))
 }
 

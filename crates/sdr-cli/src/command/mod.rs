@@ -3,6 +3,7 @@
 pub(crate) mod completions;
 pub(crate) mod deploy;
 pub(crate) mod events;
+pub(crate) mod keys;
 pub(crate) mod logs;
 pub(crate) mod sim;
 pub(crate) mod status;

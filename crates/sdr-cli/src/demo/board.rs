@@ -240,7 +240,7 @@ mod tests {
     };
 
     fn board() -> Board {
-        let session = Session { agent: None, output: Output::new(Format::Text) };
+        let session = Session { agent: None, keys: None, output: Output::new(Format::Text) };
         let bars = Bars {
             allocation_memory_bytes: Some(500_000_000),
             relaxed_memory_bytes: Some(250_000_000),
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn a_full_board_fits_a_small_terminal() {
         let mut board = board();
-        board.finish("3 agents up on loopback", Step::Deploy);
+        board.finish("3 agents up on loopback, sealed", Step::Deploy);
         board.doing("x".repeat(200));
         board.wait_for(&["one".to_owned(), "two".to_owned()]);
 

@@ -1,6 +1,6 @@
 //! From robot.toml as written to the checked configuration.
 
-use std::{net::SocketAddr, path::PathBuf, time::Duration};
+use std::{path::PathBuf, time::Duration};
 
 use sdr_core::{
     id::{Name, NameError, RobotId},
@@ -12,23 +12,22 @@ use sdr_core::{
 use super::{
     config::{
         ApiConfig, CapacityConfig, ComponentsConfig, DeviceConfig, LogConfig, LogFormat,
-        LogsConfig, MeshConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig,
-        RosConfig, SensorsConfig, StorageConfig, SystemPort,
+        LogsConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig, RosConfig,
+        SensorsConfig, StorageConfig, SystemPort,
     },
     file::{
-        CapacityTable, ComponentsTable, Devices, LogTable, MeshTable, RadioMode, RadioTable,
-        RecordingsEntry, RobotFile, RobotTable, SensorsTable, StorageTable,
+        CapacityTable, ComponentsTable, Devices, LogTable, RadioMode, RadioTable, RecordingsEntry,
+        RobotFile, RobotTable, SensorsTable, StorageTable,
     },
+    mesh::{api_listen, bounded, mesh},
     places::Places,
     sources::{BatterySource, PositionSource, RssiEntry, RssiSource, SensorEntry},
 };
 use crate::{
     problem::Mark,
-    read::{At, Reader, address},
+    read::{At, Reader},
 };
 
-/// The mesh's UDP port when none is given.
-const MESH_PORT: u16 = 7600;
 /// Highest DDS domain whose ports are below 65536.
 const DOMAIN_MAX: u16 = 232;
 
@@ -39,7 +38,7 @@ pub(super) fn checked(
     reader: &mut Reader,
 ) -> Option<RobotConfig> {
     let (name, labels, devices) = body(file.robot, places, reader);
-    let mesh = mesh(file.mesh, reader);
+    let mesh = mesh(file.mesh, places, reader);
     let capacity = capacity(file.capacity, reader);
     let radio = radio(file.radio, places, reader);
     let sensors = file.sensors.map(|table| sensors(table, places, reader)).unwrap_or_default();
@@ -47,7 +46,11 @@ pub(super) fn checked(
     let ros =
         RosConfig { domain_id: domain_id.map_or(0, |domain| self::domain_id(&domain, reader)) };
     let preference = file.coordinator.and_then(|table| table.preference);
-    let socket = file.api.and_then(|table| table.socket);
+    let (socket, listen) = file.api.map_or((None, None), |table| (table.socket, table.listen));
+    let api = ApiConfig {
+        socket: path_or(socket, places, || places.run.join("agent.sock")),
+        listen: api_listen(listen, mesh.as_ref(), reader),
+    };
     let storage = storage(file.storage, places, reader);
     let log = log(file.log, reader);
     let config = RobotConfig {
@@ -61,7 +64,7 @@ pub(super) fn checked(
         components: components(file.components, places),
         ros,
         coordinator: preference.map_or(RolePreference::Able, |preference| preference.value),
-        api: ApiConfig { socket: path_or(socket, places, || places.run.join("agent.sock")) },
+        api,
         storage,
         log,
     };
@@ -149,82 +152,6 @@ fn capacity(table: Option<CapacityTable>, reader: &mut Reader) -> CapacityConfig
         cpu: cpu.map(|at| at.value),
         reserve_memory: reserve.map_or(Bytes::mega(150), |at| at.value),
     }
-}
-
-fn mesh(table: At<MeshTable>, reader: &mut Reader) -> Option<MeshConfig> {
-    let At { value: table, mark } = table;
-    let unsealed = check_seal(&table, mark, reader);
-    let listen = match table.listen {
-        Some(listen) => loopback(&listen, reader),
-        None => Some(SocketAddr::from(([127, 0, 0, 1], MESH_PORT))),
-    };
-    let seeds = table.seeds.map(|seeds| seeds.value).unwrap_or_default();
-    let seeds: Vec<SocketAddr> = seeds.iter().filter_map(|seed| loopback(seed, reader)).collect();
-    let mut within = |given: Option<At<Duration>>, default, range| {
-        given.map_or(default, |at| bounded(&at, range, reader))
-    };
-    let gossip_period = within(table.gossip_period, Duration::from_millis(250), (20, 10_000));
-    let gone_mark = table.gone_after.as_ref().map(|at| at.mark);
-    let gone_after = within(table.gone_after, Duration::from_secs(10), (100, 600_000));
-    let rejoin_wait = within(table.rejoin_wait, Duration::from_secs(2), (0, 60_000));
-    if gone_after < gossip_period * 3 {
-        let message = format!("gone_after {gone_after:?} is less than 3 rounds of gossip");
-        let help = format!("allowed: {:?} or more", gossip_period * 3);
-        reader.problem(gone_mark.unwrap_or(Mark::FILE), message, Some(help));
-    }
-    Some(MeshConfig {
-        fleet: table.fleet.map_or_else(|| String::from("fleet"), |fleet| fleet.value.to_string()),
-        unsealed,
-        listen: listen?,
-        seeds,
-        gossip_period,
-        gone_after,
-        rejoin_wait,
-    })
-}
-
-/// Whether datagrams are plain, which this version needs to be told.
-fn check_seal(table: &MeshTable, mark: Mark, reader: &mut Reader) -> bool {
-    let (unsealed, mark) = match (&table.unsealed, &table.keys) {
-        (Some(flag), keys) => (flag.value, keys.as_ref().map_or(flag.mark, |keys| keys.mark)),
-        (None, Some(keys)) => (false, keys.mark),
-        // The word behind `unsealed` was told before.
-        (None, None) if !reader.is_clean() => return false,
-        (None, None) => (false, mark),
-    };
-    if !unsealed {
-        let help = "allowed for now: `unsealed = true`, on loopback addresses only";
-        let message = "a sealed mesh (with keys) is not in this version";
-        reader.problem(mark, message, Some(help.to_owned()));
-    }
-    unsealed
-}
-
-/// An address on loopback, where alone plain datagrams are allowed.
-fn loopback(at: &At<String>, reader: &mut Reader) -> Option<SocketAddr> {
-    let Some(address) = address(&at.value, MESH_PORT) else {
-        let message = format!("`{}` is no IP address with port", at.value);
-        let help = String::from("allowed: such as 127.0.0.1:7600 or [::1]:7600");
-        reader.problem(at.mark, message, Some(help));
-        return None;
-    };
-    if !address.ip().is_loopback() {
-        let message = format!("`{}` is not loopback, and this mesh is not sealed", at.value);
-        let help = String::from("allowed: 127.0.0.0/8 and ::1");
-        reader.problem(at.mark, message, Some(help));
-        return None;
-    }
-    Some(address)
-}
-
-/// A time within `range`, in milliseconds, both ends allowed.
-fn bounded(at: &At<Duration>, range: (u64, u64), reader: &mut Reader) -> Duration {
-    let (least, most) = (Duration::from_millis(range.0), Duration::from_millis(range.1));
-    if at.value < least || at.value > most {
-        let message = format!("{:?} is out of range", at.value);
-        reader.problem(at.mark, message, Some(format!("allowed: {least:?} to {most:?}")));
-    }
-    at.value
 }
 
 fn radio(table: Option<RadioTable>, places: &Places, reader: &mut Reader) -> RadioConfig {

@@ -66,11 +66,11 @@ pub struct CapacityConfig {
 /// How the robot meets the others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MeshConfig {
-    /// Datagrams of other fleets are dropped.
-    pub fleet: String,
-    /// Datagrams are not sealed; only ever true on loopback.
-    pub unsealed: bool,
-    /// UDP; port 0 takes a free one.
+    /// Datagrams of other fleets are dropped; `None` takes the fleet of the keys.
+    pub fleet: Option<String>,
+    /// Who can read and write datagrams.
+    pub seal: Seal,
+    /// UDP, for datagrams and QUIC; port 0 takes a free one.
     pub listen: SocketAddr,
     /// Where others listen.
     pub seeds: Vec<SocketAddr>,
@@ -80,6 +80,17 @@ pub struct MeshConfig {
     pub gone_after: Duration,
     /// How long to wait for a peer after the start.
     pub rejoin_wait: Duration,
+    /// From learning a new mesh key to sealing with it.
+    pub key_grace: Duration,
+}
+
+/// Who can read and write datagrams of the mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Seal {
+    /// Robots whose folder holds the fleet's mesh key.
+    Keys(PathBuf),
+    /// Whoever reaches the port: loopback, or asked for in so many words.
+    Plain,
 }
 
 /// The radio.
@@ -133,6 +144,8 @@ pub struct RosConfig {
 pub struct ApiConfig {
     /// Unix socket.
     pub socket: PathBuf,
+    /// TCP, for operators with certificates; `None` when nobody else is served.
+    pub listen: Option<SocketAddr>,
 }
 
 /// What is kept on disk.

@@ -11,6 +11,7 @@ use sdr_core::{
 
 use super::{
     config::{LogFormat, OnAgentDeath},
+    mesh::Unsealed,
     sources::{BatteryEntry, PositionEntry, RssiEntry},
 };
 use crate::{
@@ -73,13 +74,14 @@ table! {
 table! {
     /// How the robot meets the others.
     pub(crate) struct MeshTable {
-        /// Folder with certificate and mesh key.
+        /// Folder with certificate and mesh keys, made by `sdr keys add ROBOT`.
         keys: Option<At<String>>,
-        /// Plain datagrams; allowed on loopback only.
-        unsealed: Option<At<bool>>,
-        /// The fleet's name, default `fleet`; datagrams of other fleets are dropped.
+        /// Plain datagrams instead: true on loopback, "anywhere" on any network.
+        unsealed: Option<At<Unsealed>>,
+        /// The fleet's name; default that of the keys, else `fleet`.
         fleet: Option<At<RobotId>>,
-        /// UDP address; default 127.0.0.1:7600, port 0 takes a free one.
+        /// UDP address, for datagrams and QUIC; default 0.0.0.0:7600, 127.0.0.1:7600 without keys;
+        /// port 0 takes a free one.
         listen: Option<At<String>>,
         /// Where others listen; the rest are learned.
         seeds: Option<At<Vec<At<String>>>>,
@@ -89,6 +91,9 @@ table! {
         gone_after: Option<At<Duration>>,
         /// How long to wait for a peer after the start; default 2s.
         rejoin_wait: Option<At<Duration>>,
+        /// From learning a new mesh key to sealing with it; as long again, and older ones
+        /// open no more; default 20s.
+        key_grace: Option<At<Duration>>,
     }
     later {
         discovery: "finding peers on the local network",
@@ -160,9 +165,11 @@ table! {
     pub(crate) struct ApiTable {
         /// Unix socket; default /run/sdr/agent.sock, or below XDG_RUNTIME_DIR.
         socket: Option<At<String>>,
+        /// TCP address for operators of other machines, such as 0.0.0.0:7601; needs [mesh]
+        /// keys; default: none.
+        listen: Option<At<String>>,
     }
     later {
-        listen: "the API over mutual TLS",
         prometheus: "metrics for Prometheus",
     }
 }

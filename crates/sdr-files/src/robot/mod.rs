@@ -5,6 +5,7 @@
 mod check;
 mod config;
 mod file;
+mod mesh;
 mod places;
 mod sources;
 
@@ -12,8 +13,8 @@ use std::path::Path;
 
 pub use config::{
     ApiConfig, CapacityConfig, ComponentsConfig, DeviceConfig, LogConfig, LogFormat, LogsConfig,
-    MeshConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig, RosConfig, SensorsConfig,
-    StorageConfig, SystemPort,
+    MeshConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig, RosConfig, Seal,
+    SensorsConfig, StorageConfig, SystemPort,
 };
 pub use places::Places;
 pub use sources::{BatterySource, PositionSource, RssiSource};

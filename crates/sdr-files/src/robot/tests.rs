@@ -77,3 +77,20 @@ fn every_problem_is_told_at_once() {
     let lines: Vec<u32> = problems.as_slice().iter().map(|problem| problem.line).collect();
     assert_eq!(lines, [2, 5, 7], "{problems}");
 }
+
+#[test]
+fn a_mesh_with_keys_listens_everywhere_and_its_api_where_it_is_told() {
+    let config = parse("[mesh]\nkeys = \"keys\"\n[api]\nlisten = \"0.0.0.0\"\n").unwrap();
+
+    assert_eq!(config.mesh.seal, Seal::Keys(PathBuf::from("/fleet/robot-1/keys")));
+    assert_eq!(config.mesh.listen.to_string(), "0.0.0.0:7600");
+    assert_eq!(config.api.listen.unwrap().to_string(), "0.0.0.0:7601");
+    assert_eq!(config.mesh.fleet, None);
+}
+
+#[test]
+fn plain_datagrams_go_anywhere_only_when_asked_for_in_so_many_words() {
+    let config = parse("[mesh]\nunsealed = \"anywhere\"\nlisten = \"0.0.0.0\"\n").unwrap();
+
+    assert_eq!(config.mesh.seal, Seal::Plain);
+}

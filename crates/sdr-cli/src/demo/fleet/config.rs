@@ -11,8 +11,6 @@ use super::super::ROBOTS;
 
 /// What all robots of the fleet share.
 pub(super) struct Common<'a> {
-    /// Name of the fleet: datagrams of other demos on this machine are dropped.
-    pub(super) fleet: &'a str,
     /// UDP ports of the mesh, one for each of [`ROBOTS`].
     pub(super) ports: &'a [u16],
     /// The DDS domain.
@@ -29,6 +27,8 @@ pub(super) struct Places {
     pub(super) config: PathBuf,
     /// Its API.
     pub(super) socket: PathBuf,
+    /// Its certificate and mesh key.
+    pub(super) keys: PathBuf,
     /// What it keeps.
     pub(super) state: PathBuf,
     /// What it writes.
@@ -42,6 +42,7 @@ impl Places {
         Self {
             config: own.join("robot.toml"),
             socket: own.join("a.sock"),
+            keys: own.join("keys"),
             state: own.join("state"),
             log: own.join("agent.log"),
         }
@@ -69,8 +70,7 @@ devices = {{ fisheye = {fisheye}, camera = {camera}, wheels = {wheels} }}
 memory = "1.9GB"
 cpu = "400%"
 [mesh]
-unsealed = true
-fleet = "{fleet}"
+keys = {keys}
 listen = {listen}
 seeds = [{seeds}]
 [radio]
@@ -93,7 +93,7 @@ recordings = {{ ports = ["exploration.position.odometry"] }}
         fisheye = quoted(&body.fisheye),
         camera = quoted(&body.camera),
         wheels = quoted(&body.wheels),
-        fleet = common.fleet,
+        keys = quoted(&places.keys),
         listen = address(&common.ports[index]),
         seeds = seeds.join(", "),
         wireless = quoted(&body.wireless),
@@ -134,7 +134,6 @@ mod tests {
         for (index, robot) in ROBOTS.into_iter().enumerate() {
             let places = Places::new(folder.path(), index);
             let common = Common {
-                fleet: "demo-1f",
                 ports: &[4001, 4002, 4003],
                 domain: 17,
                 programs: Path::new("/opt/a \"quoted\" folder"),

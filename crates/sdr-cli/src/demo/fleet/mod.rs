@@ -8,9 +8,11 @@ mod ports;
 use std::{
     fs, io,
     path::Path,
-    time::{Duration, Instant},
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
+use sdr_core::id::RobotId;
+use sdr_keys::authority::Authority;
 use sdr_lab::world::RobotPaths;
 
 use super::ROBOTS;
@@ -45,12 +47,13 @@ impl Fleet {
         let domain = ports::free_domain(std::process::id()).ok_or_else(|| {
             tell("find a free DDS domain", &"UDP ports of the domains 1 to 99 are all in use")
         })?;
-        let fleet = format!("demo-{:x}", std::process::id());
-        let common =
-            Common { fleet: &fleet, ports: &ports, domain, programs: &programs, coordinator };
+        let authority = authority(folder)?;
+        let common = Common { ports: &ports, domain, programs: &programs, coordinator };
         let mut started = Self { agents: Vec::new() };
         for (index, (robot, body)) in ROBOTS.into_iter().zip(bodies).enumerate() {
             let places = Places::new(folder, index);
+            let name = RobotId::new(robot).expect("ROBOTS are names");
+            authority.add_robot(&name, &places.keys)?;
             let text = config::text(&common, index, &places, body);
             write(&places.config, &text)
                 .map_err(|error| tell(&format!("write {}", places.config.display()), &error))?;
@@ -80,6 +83,14 @@ impl Drop for Fleet {
     fn drop(&mut self) {
         self.stop();
     }
+}
+
+/// Keys for one run; other demos on this machine have others.
+fn authority(folder: &Path) -> Result<Authority, Failure> {
+    let fleet = RobotId::new(&format!("demo-{:x}", std::process::id())).expect("a short name");
+    let wall = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let (authority, _) = Authority::init(&folder.join("authority"), &fleet, wall)?;
+    Ok(authority)
 }
 
 fn write(path: &Path, text: &str) -> io::Result<()> {

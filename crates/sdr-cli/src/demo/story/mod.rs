@@ -118,7 +118,8 @@ impl Story<'_> {
                 right.then(|| holder.to_owned())
             })
             .await?;
-        self.board.finish(format!("3 agents up on loopback, coordinator {holder}"), Step::Deploy);
+        self.board
+            .finish(format!("3 agents up on loopback, sealed, coordinator {holder}"), Step::Deploy);
         self.coordinator.at_start = Some(holder);
         Ok(())
     }

@@ -44,7 +44,12 @@ fn mesh(number: usize, robots: usize, counter: u64) -> Mesh {
 }
 
 fn role(holder: usize, term: u64) -> FleetRecord {
-    let value = FleetValue::Role(RoleRecord { holder: robot(holder), term, fitness: 1, by_operator: false });
+    let value = FleetValue::Role(RoleRecord {
+        holder: robot(holder),
+        term,
+        fitness: 1,
+        by_operator: false,
+    });
     let version = Version { epoch: None, revision: 0, term, author: robot(holder) };
     FleetRecord::new(RecordKind::ROLE, "".into(), version, &value)
 }
