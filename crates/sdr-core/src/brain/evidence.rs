@@ -74,7 +74,7 @@ impl Brain {
     }
 
     /// Homes of the components that a component talks with.
-    fn partners(&self, component: &ComponentKey) -> Vec<RobotId> {
+    pub(super) fn partners(&self, component: &ComponentKey) -> Vec<RobotId> {
         let Some(system) = self.systems.get(&component.system) else { return Vec::new() };
         let others = system.connections.iter().filter_map(|wire| {
             let (from, to) = (&wire.from.component, &wire.to.component);

@@ -83,8 +83,8 @@ impl Brain {
         let count = u32::try_from(links.len()).unwrap_or(u32::MAX);
         let sum: u32 = links.iter().map(|link| link.loss.0).sum();
         let reached = links.iter().filter(|link| link.loss <= REACHED_LOSS_MAX).count();
-        let others = self.mesh.alive().count().max(1);
-        let share = u32::try_from(reached * 1000 / others).unwrap_or(1000);
+        // a robot tells of some of its links only: their share stands for all
+        let share = u32::try_from(reached * 1000 / links.len().max(1)).unwrap_or(1000);
         Figures {
             battery: seen.battery,
             cpu: seen.cpu,

@@ -17,20 +17,31 @@ use crate::{
     units::{Bytes, Permille},
 };
 
-/// Host figures are said at least so often.
-const HOST_PERIOD: Duration = Duration::from_secs(1);
-/// Links are said at most so often.
+/// Host figures are said again at the latest so long after the last time ...
+const HOST_PERIOD: Duration = Duration::from_secs(10);
+/// ... and figures of components at most so often.
+const USAGE_PERIOD: Duration = Duration::from_secs(1);
+/// Links are looked at so often.
 const LINK_PERIOD: Duration = Duration::from_secs(2);
 /// A change of memory that is said at once.
 const MEMORY_STEP: Bytes = Bytes(8_000_000);
 /// A change of CPU that is said at once, thousandths of a core.
 const CPU_STEP: u32 = 100;
 /// A change of a component's memory that is said within a second.
-const USAGE_MEMORY_STEP: Bytes = Bytes(500_000);
+const USAGE_MEMORY_STEP: Bytes = Bytes(2_000_000);
 /// A change of a component's CPU that is said within a second, thousandths of a core.
-const USAGE_CPU_STEP: u32 = 10;
+const USAGE_CPU_STEP: u32 = 20;
 /// A change of the radio that is said at once, tenths of a dBm.
 const RSSI_STEP: u16 = 10;
+
+/// Links said, beside those that components here use.
+const LINKS_SAID: usize = 8;
+/// A change of a round trip that is said, as a share of it, when it is more than a few ms.
+const RTT_SHARE: u32 = 4;
+/// Changes of round trips and jitter below this are noise.
+const RTT_STEP: Duration = Duration::from_millis(5);
+/// A change of loss that is said, thousandths.
+const LOSS_STEP: u32 = 80;
 
 /// Refusals of one component that others hear of; all of them stand in the event.
 const REFUSALS_TOLD: usize = 8;
@@ -40,6 +51,7 @@ const REFUSALS_TOLD: usize = 8;
 pub(super) struct Said {
     host: Option<(Instant, HostReport)>,
     links_at: Option<Instant>,
+    links: BTreeMap<RobotId, LinkReport>,
     instances: BTreeMap<ComponentKey, (Instant, InstanceReport)>,
     restarts: BTreeMap<ComponentKey, u16>,
     calls: Calls,
@@ -106,16 +118,50 @@ impl Brain {
         }
     }
 
+    /// Links that matter here, when they changed enough.
     fn say_links(&mut self, now: Instant) {
         if self.said.links_at.is_some_and(|at| now.since(at) < LINK_PERIOD) {
             return;
         }
         self.said.links_at = Some(now);
-        let links: Vec<(RobotId, LinkReport)> =
-            self.mesh.links().map(|(robot, link)| (robot.clone(), link)).collect();
-        for (robot, link) in links {
-            self.mesh.report(&Report::Link(robot, link), Push::WithGossip);
+        let links = self.links_that_matter();
+        let silent: Vec<RobotId> =
+            self.said.links.keys().filter(|robot| !links.contains_key(*robot)).cloned().collect();
+        for robot in silent {
+            self.said.links.remove(&robot);
+            self.mesh.retract(&AuthorKey::link(&robot));
         }
+        for (robot, link) in links {
+            if self.said.links.get(&robot).is_none_or(|before| link_differs(before, &link)) {
+                self.said.links.insert(robot.clone(), link);
+                self.mesh.report(&Report::Link(robot, link), Push::WithGossip);
+            }
+        }
+    }
+
+    /// Links to the homes that components here talk with and to the coordinator, and some
+    /// others, so that a report does not grow with the fleet.
+    fn links_that_matter(&self) -> BTreeMap<RobotId, LinkReport> {
+        let mut matter: BTreeSet<RobotId> = BTreeSet::new();
+        for key in self.index.at(&self.me) {
+            matter.extend(self.partners(key));
+        }
+        matter.extend(self.role().map(|role| role.holder.clone()));
+        let mut links: BTreeMap<RobotId, LinkReport> = BTreeMap::new();
+        let mut others = Vec::new();
+        for (robot, link) in self.mesh.links() {
+            if matter.contains(robot) {
+                links.insert(robot.clone(), link);
+            } else {
+                // the same few on every look, others on every robot
+                let names = [self.me.as_str(), robot.as_str()].concat();
+                others.push((crate::order::hash64(names.as_bytes()), robot.clone(), link));
+            }
+        }
+        others.sort_unstable_by_key(|(hash, ..)| *hash);
+        let room = LINKS_SAID.saturating_sub(links.len());
+        links.extend(others.into_iter().take(room).map(|(_, robot, link)| (robot, link)));
+        links
     }
 
     /// States and tokens at once, figures when they changed enough.
@@ -133,7 +179,7 @@ impl Brain {
                 None => Push::Now,
                 Some((_, before)) if !same_but_usage(before, &report) => Push::Now,
                 Some((at, before)) => {
-                    let due = now.since(*at) >= HOST_PERIOD;
+                    let due = now.since(*at) >= USAGE_PERIOD;
                     if !due || !usage_differs(before.usage, report.usage) {
                         continue;
                     }
@@ -222,4 +268,16 @@ fn differs(before: &HostReport, now: &HostReport) -> bool {
         || before.cpu_used.0.abs_diff(now.cpu_used.0) >= CPU_STEP
         || radio
         || battery(before) != battery(now)
+}
+
+/// Whether a link is worth saying again.
+fn link_differs(before: &LinkReport, now: &LinkReport) -> bool {
+    let time =
+        |before: Duration, now: Duration| before.abs_diff(now) >= RTT_STEP.max(before / RTT_SHARE);
+    let share = |before: Permille, now: Permille| before.0.abs_diff(now.0) >= LOSS_STEP;
+    time(before.rtt, now.rtt)
+        || time(before.jitter, now.jitter)
+        || share(before.loss, now.loss)
+        || share(before.loss_out, now.loss_out)
+        || share(before.loss_in, now.loss_in)
 }

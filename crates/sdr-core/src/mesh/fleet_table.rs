@@ -183,6 +183,11 @@ impl FleetTable {
             .map(|(key, (record, value))| (key, &record.version, value))
     }
 
+    /// One hash over all records: equal tables have equal ones.
+    pub fn root(&self) -> u64 {
+        u64::from(self.tree().root())
+    }
+
     /// How many records there are.
     pub fn len(&self) -> usize {
         self.records.len()

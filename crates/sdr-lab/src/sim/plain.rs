@@ -9,8 +9,8 @@ use std::time::Duration;
 use sdr_core::{record::RecordKind, time::Instant};
 
 use super::{
-    Chance, Fault, Fleet, Incident, Record, Setup, Weather, fault::DiskFate, fleet::BEGIN,
-    measure::Measure, run::Run, systems,
+    Chance, Fault, Fleet, Incident, Record, Setup, Weather, air::FRAME_BYTES, fault::DiskFate,
+    fleet::BEGIN, measure::Measure, run::Run, systems,
 };
 
 /// Components of one system.
@@ -146,14 +146,26 @@ impl Plain {
     }
 }
 
+/// What each robot sent as guard beats so far, headers and seal included.
+fn guard_bytes(run: &Run) -> Vec<u64> {
+    let traffic = |robot: &super::Robot| robot.brain().map(|brain| brain.mesh_traffic());
+    let bytes = |robot| {
+        let traffic = traffic(robot).unwrap_or_default();
+        traffic.guard_bytes + traffic.guard * FRAME_BYTES as u64
+    };
+    run.fleet.robots.iter().map(bytes).collect()
+}
+
 /// Nothing happens; what is sent is counted.
 fn idle_bytes(run: &mut Run, time: Duration) {
     let before = run.fleet.tally.clone();
+    let guard_before = guard_bytes(run);
     run.advance(time);
     let seconds = time.as_secs_f64().max(0.001);
+    let guard_after = guard_bytes(run);
     let after = &run.fleet.tally;
     for robot in 0..run.fleet.robots.len() {
-        let guard = after.guard_bytes[robot] - before.guard_bytes[robot];
+        let guard = guard_after[robot] - guard_before[robot];
         let all = after.sent_bytes[robot] - before.sent_bytes[robot];
         run.measure.record.bytes_per_robot_s.push((all - guard) as f64 / seconds);
         run.measure.record.guard_bytes_per_robot_s.push(guard as f64 / seconds);
