@@ -93,7 +93,7 @@ fn airtime(robots: usize, bar: &str, seed: u64) {
     let joined = fleet.now;
     let join: u64 = fleet.robots.iter().map(|robot| robot.bytes).max().unwrap_or(0);
     // longer in large fleets, where reports come by more slowly
-    fleet.run(Duration::from_secs(60));
+    fleet.run(Duration::from_secs(if robots > 100 { 160 } else { 60 }));
     let before: Vec<(u64, u64)> = fleet.robots.iter().map(|r| (r.bytes, r.datagrams)).collect();
     let (window, wall) = (Duration::from_secs(60), Wall::now());
     fleet.said.clear();

@@ -136,6 +136,11 @@ impl Peers {
         Some(*address)
     }
 
+    /// How many robots were heard from an address.
+    pub(super) fn count(&self) -> usize {
+        self.seats.len()
+    }
+
     /// Addresses that robots were heard from, for the disk and for others.
     pub(super) fn addresses(&self) -> Vec<SocketAddr> {
         self.seats.keys().copied().collect()

@@ -32,6 +32,8 @@ const INTRODUCTIONS: u8 = 3;
 const NEWCOMERS_MAX: usize = 64;
 /// Robots without an address that are asked for in one round.
 const ADDRESSES_ASKED_MAX: usize = 4;
+/// Whoever hears so many robots directly looks for more only now and then.
+const ADDRESSES_ENOUGH: usize = 64;
 /// Strays are tried again this often, unless nobody is heard.
 const STRAY_PERIOD: Duration = Duration::from_secs(4);
 /// A quiet robot is pinged at most so often.
@@ -151,6 +153,9 @@ impl Mesh {
 
     /// Asks where robots are that live and were never heard without a relay.
     fn ask_addresses(&self) -> Option<Section> {
+        if self.peers.count() >= ADDRESSES_ENOUGH {
+            return None;
+        }
         let lacking =
             self.liveness.living().filter(|(seat, _)| self.peers.address(*seat).is_none());
         let ids: Vec<u32> =
@@ -230,6 +235,9 @@ impl Mesh {
     fn greet_stray(&mut self, alone: bool) {
         let due = self.told.strays_at.is_none_or(|at| self.clock.since(at) >= STRAY_PERIOD);
         let again = alone || self.is_isolated() || due;
+        if !again && self.peers.count() >= ADDRESSES_ENOUGH {
+            return;
+        }
         let Some(address) = self.peers.next_stray(self.clock, again) else { return };
         self.told.strays_at = Some(self.clock);
         let mut greeting = self.greeting(Seat::OWN);
