@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::{
     allocate::{Homeless, Placement},
     event::Event,
+    fitness::RolePolicy,
+    id::RobotId,
     lifecycle::LifecycleState,
     spec::SystemSpec,
 };
@@ -20,6 +22,9 @@ pub struct StatusView {
     pub coordinator: Option<String>,
     /// Its term.
     pub term: u64,
+    /// The role in full.
+    #[serde(default)]
+    pub role: RoleView,
     /// All robots ever heard of, by name.
     pub robots: Vec<RobotView>,
     /// All systems, by name.
@@ -146,6 +151,89 @@ pub struct DeployAnswer {
     pub revision: u64,
     /// False when the same system was deployed already and nothing changed.
     pub changed: bool,
+}
+
+/// `POST /v1/role/move`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoleMoveRequest {
+    /// Who should hold the coordinator role.
+    pub to: RobotId,
+}
+
+/// `POST /v1/role/policy`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RolePolicyRequest {
+    /// The checked policy.
+    pub policy: RolePolicy,
+}
+
+/// Answer to a change of the role or its policy that was accepted and stored.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoleAnswer {
+    /// The holder from now on; null before the first.
+    pub holder: Option<String>,
+    /// Its term.
+    pub term: u64,
+    /// False when it was so already.
+    pub changed: bool,
+}
+
+/// What came of a request that was accepted.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Accepted {
+    /// A system was deployed or undeployed.
+    System(DeployAnswer),
+    /// The role or its policy was changed.
+    Role(RoleAnswer),
+}
+
+/// The coordinator role as one robot sees it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoleView {
+    /// Who holds it.
+    pub holder: Option<String>,
+    /// Which holder that is, counted.
+    pub term: u64,
+    /// An operator named the holder.
+    pub by_operator: bool,
+    /// This robot holds it, and decides nothing because it hears nobody.
+    pub suspended: bool,
+    /// Who follows when the holder is silent, the first first; empty when it did not say.
+    pub successors: Vec<String>,
+    /// Who is being offered the role.
+    pub offered_to: Option<String>,
+    /// Why it is offered.
+    pub reason: String,
+    /// The policy in force.
+    pub policy: String,
+    /// Living robots that may hold it, the best first.
+    pub candidates: Vec<CandidateView>,
+}
+
+/// One robot that may hold the role.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CandidateView {
+    /// Its name.
+    pub robot: String,
+    /// 0 to 1000.
+    pub points: u32,
+    /// Why it should not hold it.
+    pub unfit: Option<String>,
+    /// robot.toml or the policy puts it before the others.
+    pub preferred: bool,
+    /// What the points are made of.
+    pub parts: Vec<FitnessPartView>,
+}
+
+/// One aspect of a robot's fitness.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FitnessPartView {
+    /// `battery`, `cpu`, `memory`, `links` or `centrality`.
+    pub aspect: String,
+    /// 0 to 1000.
+    pub score: u32,
+    /// How much it counts.
+    pub weight: u16,
 }
 
 /// An event as the API and recordings give it.

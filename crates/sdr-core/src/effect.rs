@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     allocate::Problem,
-    api::DeployAnswer,
+    api::Accepted,
     event::Event,
     id::{ComponentKey, Name, RobotId},
     input::{InstanceId, PlanId, RequestId, StoreTicket},
@@ -56,7 +56,7 @@ pub enum Effect {
         /// Whom.
         request: RequestId,
         /// What; the error is a sentence for the operator.
-        result: Result<DeployAnswer, String>,
+        result: Result<Accepted, String>,
     },
     /// Tell operators and the recording.
     Event(Event),

@@ -5,7 +5,8 @@ use core::net::SocketAddr;
 
 use crate::{
     allocate::{AllocError, Plan},
-    id::Name,
+    fitness::RolePolicy,
+    id::{Name, RobotId},
     lifecycle::LifecycleState,
     order::Token,
     recover::Cause,
@@ -67,6 +68,20 @@ pub enum Input {
         request: RequestId,
         /// Which one.
         system: Name,
+    },
+    /// An operator wants a robot to hold the coordinator role.
+    MoveRole {
+        /// To be answered.
+        request: RequestId,
+        /// Which robot.
+        to: RobotId,
+    },
+    /// An operator wants the holder chosen otherwise.
+    RolePolicy {
+        /// To be answered.
+        request: RequestId,
+        /// How; checked by the shell.
+        policy: Box<RolePolicy>,
     },
     /// A plan is ready.
     Planned {

@@ -42,6 +42,7 @@ pub mod spec;
 
 pub mod allocate;
 pub mod event;
+pub mod fitness;
 pub mod recover;
 
 pub mod brain;

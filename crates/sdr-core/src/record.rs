@@ -9,6 +9,7 @@ use alloc::{string::String, vec::Vec};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    fitness::RolePolicy,
     id::{ComponentKey, Name, RobotId},
     spec::{ComponentSpec, ConnectionSpec, PolicyBytes},
 };
@@ -35,6 +36,8 @@ impl RecordKind {
     pub const ASSIGNMENT: Self = Self(6);
     /// [`RoleRecord`], keyed by nothing.
     pub const ROLE: Self = Self(7);
+    /// [`RolePolicy`], keyed by nothing.
+    pub const ROLE_POLICY: Self = Self(10);
 }
 
 /// Names one shared fact.
@@ -89,6 +92,8 @@ pub struct RoleRecord {
     pub term: u64,
     /// The fitness it took the role with, for people.
     pub fitness: u32,
+    /// An operator named the holder: only trouble takes the role away, not a fitter robot.
+    pub by_operator: bool,
 }
 
 /// A checked value of the fleet table.
@@ -108,6 +113,8 @@ pub enum FleetValue {
     Assignment(Assignment),
     /// The role.
     Role(RoleRecord),
+    /// How its holder is chosen.
+    RolePolicy(RolePolicy),
     /// A kind that this version does not know; kept and passed on.
     Unknown,
 }
@@ -126,6 +133,7 @@ impl FleetValue {
             RecordKind::RECOVERY => take(bytes).map(Self::Recovery),
             RecordKind::ASSIGNMENT => take(bytes).map(Self::Assignment),
             RecordKind::ROLE => take(bytes).map(Self::Role),
+            RecordKind::ROLE_POLICY => take(bytes).map(Self::RolePolicy),
             _ => Ok(Self::Unknown),
         }
     }
@@ -139,6 +147,7 @@ impl FleetValue {
             Self::Allocation(value) | Self::Recovery(value) => postcard::to_allocvec(value),
             Self::Assignment(value) => postcard::to_allocvec(value),
             Self::Role(value) => postcard::to_allocvec(value),
+            Self::RolePolicy(value) => postcard::to_allocvec(value),
             Self::Unknown => Ok(Vec::new()),
         };
         bytes.expect("writing plain data to memory cannot fail")

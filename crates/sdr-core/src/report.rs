@@ -72,8 +72,13 @@ pub struct LinkReport {
     pub rtt: Duration,
     /// Mean change from one round trip to the next (RFC 3550, section 6.4.1).
     pub jitter: Duration,
-    /// Lost datagrams of the last 64, thousandths.
+    /// Lost of the last 64 datagrams there or back, thousandths: what a question with its
+    /// answer suffers.
     pub loss: Permille,
+    /// Lost of the last 64 datagrams to the other robot, as it counts them.
+    pub loss_out: Permille,
+    /// Lost of the last 64 datagrams from the other robot.
+    pub loss_in: Permille,
 }
 
 /// What an instance does on its robot.
@@ -124,6 +129,23 @@ pub struct ConditionReport {
     pub foreseen: bool,
 }
 
+/// What the holder of the coordinator role says of those who may follow it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SuccessionReport {
+    /// The term it speaks of.
+    pub term: u64,
+    /// Who takes over when it is silent, the first first; they hear its beats directly.
+    pub order: Vec<RobotId>,
+    /// Period of those beats.
+    pub beat: Duration,
+    /// Beats that may be missed on a good link.
+    pub misses: u32,
+    /// Who should take the role now.
+    pub offered_to: Option<RobotId>,
+    /// Why it is offered.
+    pub reason: String,
+}
+
 /// Everything an author may say, one record each.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Report {
@@ -139,4 +161,6 @@ pub enum Report {
     Condition(ConditionReport),
     /// The coordinator found no home for a component.
     Homeless(Homeless),
+    /// The coordinator's successors.
+    Succession(SuccessionReport),
 }

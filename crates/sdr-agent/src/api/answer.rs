@@ -31,6 +31,11 @@ impl Refusal {
         Self::new(StatusCode::BAD_REQUEST, error)
     }
 
+    /// The brain answered another question than was asked: a defect of this agent.
+    pub(super) fn crossed() -> Self {
+        Self::new(StatusCode::INTERNAL_SERVER_ERROR, "the answer belongs to another question")
+    }
+
     /// The loop ended; so does the agent.
     pub(super) fn stopping() -> Self {
         Self::new(StatusCode::SERVICE_UNAVAILABLE, "the agent is stopping")
@@ -51,7 +56,7 @@ impl IntoResponse for Refusal {
 
 pub(super) async fn no_such_path(State(state): State<ApiState>, uri: Uri) -> Refusal {
     let error = format!(
-        "no `{}` here; there are /v1/status, /v1/deploy, /v1/systems/NAME, /v1/events, \
+        "no `{}` here; there are /v1/status, /v1/deploy, /v1/systems/NAME, /v1/role/move, /v1/role/policy, /v1/events, \
          /v1/logs/SYSTEM/COMPONENT, /v1/components, /v1/plan, /v1/recording, /v1/health",
         uri.path()
     );
@@ -65,7 +70,7 @@ pub(super) async fn wrong_method(
     uri: Uri,
 ) -> Refusal {
     let error = format!(
-        "{method} is not for {}; POST is for /v1/deploy, DELETE for /v1/systems/NAME, GET for \
+        "{method} is not for {}; POST is for /v1/deploy and /v1/role/..., DELETE for /v1/systems/NAME, GET for \
          all others",
         uri.path()
     );

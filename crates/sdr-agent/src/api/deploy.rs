@@ -7,7 +7,7 @@ use axum::body::Bytes;
 use axum::extract::{FromRequest as _, Path, Request, State};
 use axum::http::{StatusCode, header};
 use sdr_core::{
-    api::{DeployAnswer, DeployRequest},
+    api::{Accepted, DeployAnswer, DeployRequest},
     id::Name,
     input::{Input, RequestId},
 };
@@ -41,7 +41,8 @@ pub(super) async fn deploy(
     }
     // What was installed a moment ago counts.
     state.installed.refresh(Look::Thorough).await.map_err(|LoopEnded| Refusal::stopping())?;
-    ask(&state, |request_id| Input::Deploy { request: request_id, system: request.system }).await
+    let wish = |request_id| Input::Deploy { request: request_id, system: request.system };
+    system_answer(ask(&state, wish).await?)
 }
 
 /// The length of the body as its head says.
@@ -59,14 +60,21 @@ pub(super) async fn undeploy(
     Path(word): Path<String>,
 ) -> Result<Json<DeployAnswer>, Refusal> {
     let system = Name::new(&word).map_err(|error| Refusal::bad(&state, error.to_string()))?;
-    ask(&state, |request| Input::Undeploy { request, system }).await
+    system_answer(ask(&state, |request| Input::Undeploy { request, system }).await?)
+}
+
+fn system_answer(accepted: Accepted) -> Result<Json<DeployAnswer>, Refusal> {
+    match accepted {
+        Accepted::System(answer) => Ok(Json(answer)),
+        Accepted::Role(_) => Err(Refusal::crossed()),
+    }
 }
 
 /// Puts a wish to the brain and waits for its answer, which comes when it is on disk.
-async fn ask(
+pub(super) async fn ask(
     state: &ApiState,
     wish: impl FnOnce(RequestId) -> Input,
-) -> Result<Json<DeployAnswer>, Refusal> {
+) -> Result<Accepted, Refusal> {
     let (request, answer) = state.desk.open();
     let asked = async {
         state.inputs.send(wish(request)).await.map_err(|_| Refusal::stopping())?;
@@ -75,7 +83,7 @@ async fn ask(
     let answered = tokio::time::timeout(ANSWER_MAX, asked).await;
     state.desk.close(request);
     match answered {
-        Ok(Ok(Ok(answer))) => Ok(Json(answer)),
+        Ok(Ok(Ok(answer))) => Ok(answer),
         Ok(Ok(Err(sentence))) => Err(Refusal::new(StatusCode::CONFLICT, sentence)),
         Ok(Err(refusal)) => Err(refusal),
         Err(_elapsed) => Err(Refusal::new(

@@ -5,6 +5,7 @@ mod components;
 mod deploy;
 mod events;
 mod logs;
+mod role;
 mod views;
 
 use std::collections::BTreeMap;
@@ -17,7 +18,7 @@ use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::routing::{delete, get, post};
 use sdr_core::{
-    api::{DeployAnswer, PlanView, StatusView},
+    api::{Accepted, PlanView, StatusView},
     id::RobotId,
     input::{Input, RequestId},
     mesh::MeshCounters,
@@ -73,7 +74,7 @@ pub(crate) type LatestPlan = Arc<Mutex<PlanView>>;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AnswerDesk(Arc<Mutex<Waiting>>);
 
-type Answer = Result<DeployAnswer, String>;
+type Answer = Result<Accepted, String>;
 
 #[derive(Debug, Default)]
 struct Waiting {
@@ -180,6 +181,8 @@ fn router(state: ApiState) -> Router {
         .route("/v1/recording", get(views::recording))
         .route("/v1/deploy", post(deploy::deploy))
         .route("/v1/systems/{name}", delete(deploy::undeploy))
+        .route("/v1/role/move", post(role::hand_over))
+        .route("/v1/role/policy", post(role::set_policy))
         .route("/v1/events", get(events::events))
         .route("/v1/logs/{system}/{component}", get(logs::logs))
         .route("/v1/components", get(components::components))

@@ -4,7 +4,10 @@ use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream as Client;
 use std::time::Duration;
 
-use sdr_core::{api::ErrorAnswer, event::Event};
+use sdr_core::{
+    api::{DeployAnswer, ErrorAnswer},
+    event::Event,
+};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -230,7 +233,7 @@ async fn what_was_installed_a_moment_ago_is_told_before_the_deployment() {
         panic!("no deployment")
     };
     let said = DeployAnswer { system: "eye".into(), revision: 1, changed: true };
-    bench.state.desk.answer(request, Ok(said));
+    bench.state.desk.answer(request, Ok(Accepted::System(said)));
     assert_eq!(answer(client).await.0, 200);
 }
 
@@ -239,7 +242,11 @@ async fn a_wish_is_answered_by_the_brain() {
     let mut bench = Bench::new().await;
     for (said, code, wanted) in [
         (
-            Ok(DeployAnswer { system: "mapping".into(), revision: 3, changed: true }),
+            Ok(Accepted::System(DeployAnswer {
+                system: "mapping".into(),
+                revision: 3,
+                changed: true,
+            })),
             200,
             "\"revision\":3",
         ),

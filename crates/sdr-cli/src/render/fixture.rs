@@ -13,6 +13,7 @@ pub(crate) fn fleet() -> StatusView {
         seen_from: "robot-2".into(),
         coordinator: Some("robot-2".into()),
         term: 1,
+        role: sdr_core::api::RoleView::default(),
         robots: vec![
             robot("robot-1", 1_898_000_000, -55.0),
             robot("robot-2", 841_000_000, -47.1),

@@ -2,7 +2,7 @@
 
 use alloc::{format, vec::Vec};
 
-use super::Brain;
+use super::{Brain, index::Stir};
 use crate::{
     event::Event,
     id::{ComponentKey, Name},
@@ -80,6 +80,7 @@ impl Brain {
                 continue;
             }
             if !condition.components.contains(&seen.component.name) {
+                self.stir.fleet = true;
                 condition.components.push(seen.component.name.clone());
             }
             self.foreseen_until.insert(place, now + seen.hold * LINGER);
@@ -114,6 +115,7 @@ impl Brain {
         for (place, foreseen) in over {
             conditions.remove(&place);
             self.foreseen_until.remove(&place);
+            self.stir = Stir::ALL;
             self.mesh.retract(&AuthorKey::condition(&place.0, place.1));
             if !foreseen {
                 let text = format!("{} of {}", place.1, place.0);

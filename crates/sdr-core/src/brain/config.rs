@@ -3,7 +3,9 @@
 use alloc::{boxed::Box, string::String, vec::Vec};
 use core::{fmt, net::SocketAddr, time::Duration};
 
-use crate::{id::RobotId, recover::Recovery, report::RobotFacts, spec::PolicyBytes};
+use crate::{
+    fitness::RolePolicy, id::RobotId, recover::Recovery, report::RobotFacts, spec::PolicyBytes,
+};
 
 /// Who the robot is and how patient it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,15 +22,17 @@ pub struct BrainConfig {
     pub listen: Option<SocketAddr>,
     /// From the operating system's randomness: incarnation nonce and seed.
     pub seed: u64,
-    /// Time between two rounds of gossip; default 250 ms.
+    /// Time between two rounds of gossip; default 350 ms.
     pub gossip_period: Duration,
-    /// Age of the last fresh news at which a robot counts as gone; default 10 s.
+    /// Age of the last fresh news at which a robot counts as gone; default 11.5 s.
     pub gone_after: Duration,
     /// How long after the start to wait for a peer before activating what is remembered;
     /// default 2 s.
     pub rejoin_wait: Duration,
     /// How long an old home may go on in a planned move; default 1 s.
     pub drain_max: Duration,
+    /// How the holder of the coordinator role is chosen, until the fleet has a policy of its own.
+    pub role_policy: RolePolicy,
     /// How long the target of a move may take to get ready; default 30 s.
     pub prepare_max: Duration,
 }
@@ -43,10 +47,11 @@ impl BrainConfig {
             seeds: Vec::new(),
             listen: None,
             seed: 0,
-            gossip_period: Duration::from_millis(250),
-            gone_after: Duration::from_secs(10),
+            gossip_period: Duration::from_millis(350),
+            gone_after: Duration::from_millis(11_500),
             rejoin_wait: Duration::from_secs(2),
             drain_max: Duration::from_secs(1),
+            role_policy: RolePolicy::default(),
             prepare_max: Duration::from_secs(30),
         }
     }

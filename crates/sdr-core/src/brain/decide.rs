@@ -2,9 +2,10 @@
 
 use alloc::{
     boxed::Box,
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     format,
     string::{String, ToString},
+    sync::Arc,
     vec::Vec,
 };
 
@@ -35,8 +36,7 @@ impl Brain {
         if self.desk.is_minting() || self.plans.asked.is_some() || !self.may_begin(now) {
             return;
         }
-        let systems: Vec<SystemNow> = self.systems.values().cloned().collect();
-        for system in systems {
+        for system in self.systems_to_look_at(now) {
             if self.ask_for_orphans(now, &system)
                 || self.ask_for_leavers(now, &system)
                 || self.ask_for_homeless(now, &system)
@@ -44,6 +44,22 @@ impl Brain {
                 return;
             }
         }
+    }
+
+    /// Systems with a home that is gone, a call for help, or a component without a home.
+    fn systems_to_look_at(&self, now: Instant) -> Vec<Arc<SystemNow>> {
+        let gone = self.index.homes().filter(|home| self.is_gone(home, now));
+        let mut names: BTreeSet<&Name> =
+            gone.flat_map(|home| self.index.at(home)).map(|key| &key.system).collect();
+        names.extend(self.index.homeless.iter().map(|key| &key.system));
+        let authors = self.mesh.alive().chain([&self.me]);
+        let authors = authors.filter_map(|robot| self.mesh.authors().author(robot));
+        for report in authors.flat_map(|author| author.reports()) {
+            if let Report::Condition(condition) = report {
+                names.insert(&condition.system);
+            }
+        }
+        names.into_iter().filter_map(|name| self.systems.get(name).cloned()).collect()
     }
 
     fn ask_for_orphans(&mut self, now: Instant, system: &SystemNow) -> bool {

@@ -37,7 +37,7 @@ impl Brain {
         for spec in &running.components {
             let component = running.key(&spec.name);
             let Some(home) = self.home(&component) else { continue };
-            if !self.is_gone(home, now) {
+            if !self.is_gone(home, now) || !self.lease_is_over(now, home, spec) {
                 continue;
             }
             let reason = format!("{home} is not heard any more");

@@ -7,7 +7,7 @@ use alloc::{
     vec::Vec,
 };
 
-use super::{Brain, judge::RestartPlan};
+use super::{Brain, index::Stir, judge::RestartPlan};
 use crate::{
     effect::Command,
     event::Event,
@@ -65,6 +65,10 @@ impl Instance {
             usage: Usage::default(),
             heard: BTreeMap::new(),
         }
+    }
+
+    pub(super) fn is_told_to_act(&self) -> bool {
+        matches!(self.told, Told::Activate(_))
     }
 
     pub(super) fn is_ending(&self) -> bool {
@@ -183,6 +187,7 @@ impl Brain {
     /// A process ended or never was; a fault unless it was told to end.
     fn lose(&mut self, id: InstanceId, key: &ComponentKey, cause: Cause, reason: String) {
         let Some(instance) = self.instances.remove(&id) else { return };
+        self.reindex(key);
         if instance.is_ending() {
             self.event_about("ended", key, reason);
             return;
@@ -241,6 +246,7 @@ impl Brain {
             let waited = instance.inactive_at.is_some_and(|at| now >= at + MATCH_WAIT);
             if waited || self.routes_matched(&instance.component) {
                 self.instances.get_mut(&id).expect("listed above").ready = true;
+                self.stir = Stir::ALL;
             }
         }
     }

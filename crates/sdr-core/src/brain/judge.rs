@@ -3,7 +3,7 @@
 use alloc::{boxed::Box, collections::BTreeMap, format, string::String, vec::Vec};
 use core::fmt;
 
-use super::Brain;
+use super::{Brain, index::Stir};
 use crate::{
     event::Event,
     id::{ComponentKey, Name},
@@ -43,7 +43,8 @@ pub(super) struct RestartPlan {
 impl Brain {
     pub(super) fn judge(&mut self, now: Instant) {
         self.judge_due = false;
-        let names: Vec<Name> = self.systems.keys().cloned().collect();
+        let mut names: Vec<Name> = self.index.mine.iter().map(|key| key.system.clone()).collect();
+        names.dedup();
         self.engines.retain(|name, _| names.contains(name));
         for name in names {
             let evidence = self.evidence(&name);
@@ -99,12 +100,26 @@ impl Brain {
         }
     }
 
+    /// Keeps one engine for each policy in use.
+    pub(super) fn update_objectors(&mut self) {
+        let in_use = |policy: &PolicyBytes| self.systems.values().any(|s| s.recovery == *policy);
+        let mut objectors = core::mem::take(&mut self.objectors);
+        objectors.retain(|engine| in_use(&engine.policy));
+        for system in self.systems.values() {
+            if !objectors.iter().any(|engine| engine.policy == system.recovery) {
+                objectors.extend(self.make_engine(&system.recovery));
+            }
+        }
+        self.objectors = objectors;
+    }
+
     pub(super) fn make_engine(&self, policy: &PolicyBytes) -> Option<Engine> {
         let recovery = (self.seams.recovery)(policy).ok()?;
         Some(Engine { policy: policy.clone(), recovery })
     }
 
     fn carry_out(&mut self, now: Instant, system: &Name, verdict: Verdict) {
+        self.stir = Stir::ALL;
         let key = verdict.component.clone();
         let outcome = match verdict.remedy {
             Remedy::Restart { after } => {

@@ -33,6 +33,7 @@ impl Brain {
         let instance = self.instance_last;
         let shape = shape_hash(&spec, &inputs);
         self.instances.insert(instance, Instance::new(key.clone(), shape));
+        self.reindex(key);
         let order = LaunchOrder { instance, component: key.clone(), spec, inputs, output_depth };
         self.effects.push_back(Effect::Launch(Box::new(order)));
     }
@@ -65,7 +66,7 @@ impl Brain {
         let book = self.runs.entry(key.clone()).or_insert_with(RunBook::fresh);
         if book.last + RUNS_RESERVED / 2 >= book.reserved {
             book.reserved = book.last.saturating_add(RUNS_RESERVED);
-            self.desk.mark_dirty();
+            self.desk.mark_urgent();
         }
     }
 
@@ -75,7 +76,7 @@ impl Brain {
         let next = book.last.saturating_add(1);
         if next > book.stored {
             book.reserved = book.reserved.max(next.saturating_add(RUNS_RESERVED));
-            self.desk.mark_dirty();
+            self.desk.mark_urgent();
             return None;
         }
         book.last = next;

@@ -4,7 +4,7 @@ use alloc::{collections::BTreeMap, format, string::String, vec::Vec};
 
 use super::Brain;
 use crate::{
-    api::DeployAnswer,
+    api::Accepted,
     effect::{Effect, StoredRecord, StoredState},
     id::ComponentKey,
     input::{RequestId, StoreTicket},
@@ -18,12 +18,15 @@ use crate::{
 /// Pause after a failed store.
 const DISK_RETRY: Duration = Duration::from_secs(1);
 
+/// Records of others are gathered for so long before they are stored in one go.
+const GATHER: Duration = Duration::from_millis(200);
+
 /// Records that wait for the disk.
 #[derive(Clone, Debug)]
 struct Mint {
     ticket: StoreTicket,
     records: Vec<FleetRecord>,
-    answer: Option<(RequestId, DeployAnswer)>,
+    answer: Option<(RequestId, Accepted)>,
 }
 
 /// What is on its way to the disk.
@@ -36,11 +39,26 @@ pub(super) struct Desk {
     runs_in_flight: BTreeMap<ComponentKey, Run>,
     spoken: bool,
     broken_at: Option<Instant>,
+    /// What others made is stored at this time at the latest.
+    dirty_since: Option<Instant>,
+    urgent: bool,
 }
 
 impl Desk {
+    /// Something of others is worth storing; a burst is stored once.
     pub(super) fn mark_dirty(&mut self) {
         self.dirty = true;
+    }
+
+    /// Something here waits for the disk.
+    pub(super) fn mark_urgent(&mut self) {
+        self.dirty = true;
+        self.urgent = true;
+    }
+
+    /// When what was gathered is stored.
+    pub(super) fn store_at(&self) -> Option<Instant> {
+        self.dirty_since.map(|since| since + GATHER)
     }
 
     /// Mute until the new incarnation is on disk (or the disk is known to be broken).
@@ -69,7 +87,7 @@ impl Brain {
     pub(super) fn mint(
         &mut self,
         records: Vec<FleetRecord>,
-        answer: Option<(RequestId, DeployAnswer)>,
+        answer: Option<(RequestId, Accepted)>,
     ) {
         if planted::is(Defect::WireBeforeDisk) {
             self.mesh.publish(records.clone());
@@ -80,8 +98,13 @@ impl Brain {
     }
 
     pub(super) fn store_if_dirty(&mut self, now: Instant) {
+        if !self.desk.dirty {
+            return;
+        }
         let rests = self.desk.retry_at().is_some_and(|at| now < at);
-        if self.desk.dirty && self.desk.in_flight.is_none() && !rests {
+        let since = *self.desk.dirty_since.get_or_insert(now);
+        let due = self.desk.urgent || now >= since + GATHER;
+        if due && self.desk.in_flight.is_none() && !rests {
             self.store_now();
         }
     }
@@ -90,6 +113,8 @@ impl Brain {
         self.desk.last += 1;
         self.desk.in_flight = Some(self.desk.last);
         self.desk.dirty = false;
+        self.desk.urgent = false;
+        self.desk.dirty_since = None;
         let runs: Vec<(ComponentKey, Run)> =
             self.runs.iter().map(|(key, book)| (key.clone(), book.reserved)).collect();
         self.desk.runs_in_flight = runs.iter().cloned().collect();
@@ -138,9 +163,6 @@ impl Brain {
 
     /// Keeps running, mints nothing, says so.
     pub(super) fn handle_store_failed(&mut self, ticket: StoreTicket, reason: &str) {
-        if planted::is(Defect::DiskErrorIgnored) {
-            return self.handle_stored(ticket);
-        }
         self.desk.spoken = true;
         self.desk.broken_at = Some(self.handled_at);
         if self.desk.in_flight == Some(ticket) {

@@ -15,8 +15,12 @@ mod config;
 mod decide;
 mod effects;
 mod evidence;
+mod fitness;
 mod gone;
+mod handover;
+mod index;
 mod instances;
+mod isolation;
 mod judge;
 mod launch;
 mod minting;
@@ -27,17 +31,21 @@ mod problem;
 mod reconcile;
 mod requests;
 mod role;
+mod role_requests;
 mod routes;
 mod say;
 mod status;
 mod systems;
+mod takeover;
 #[cfg(test)]
 mod tests;
 
 use alloc::{
     boxed::Box,
     collections::{BTreeMap, BTreeSet, VecDeque},
+    format,
     string::String,
+    sync::Arc,
 };
 
 pub use config::{BrainConfig, MakeRecovery, Seams};
@@ -54,16 +62,24 @@ use crate::{
     report::{ConditionReport, HostReport},
     time::{Duration, Instant},
 };
+use index::{Index, Stir};
 use instances::{Instance, RunBook};
+use isolation::Lease;
 use judge::{Engine, RestartPlan};
 use minting::Desk;
 use moves::MoveWatch;
 use plans::PlanDesk;
+use role::RoleDesk;
 use say::Said;
-use systems::SystemNow;
+use systems::{Changed, SystemNow};
 
 /// A handler that was not called for so long was itself paused: it judges nobody by it.
 const PAUSE_MIN: Duration = Duration::from_millis(800);
+
+/// Without any sign, everything is looked at again so often.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// What was decided is looked at at once, so many times.
+const SETTLE_ROUNDS_MAX: usize = 4;
 
 /// The decisions of one robot as a state machine without I/O.
 ///
@@ -78,7 +94,13 @@ pub struct Brain {
     started_at: Instant,
     handled_at: Instant,
 
-    systems: BTreeMap<Name, SystemNow>,
+    systems: BTreeMap<Name, Arc<SystemNow>>,
+    index: Index,
+    stir: Stir,
+    /// Everything is looked at again at this time at the latest.
+    look_at: Instant,
+    /// It may start what it remembers.
+    began: bool,
     instances: BTreeMap<InstanceId, Instance>,
     instance_last: InstanceId,
     runs: BTreeMap<ComponentKey, RunBook>,
@@ -88,6 +110,8 @@ pub struct Brain {
     host: Option<HostReport>,
     said: Said,
     engines: BTreeMap<Name, Engine>,
+    /// One engine for each recovery policy of the fleet, to ask what it objects to.
+    objectors: alloc::vec::Vec<Engine>,
     /// Recovery policies that could not be read; each is told once.
     unreadable: BTreeMap<Name, crate::spec::PolicyBytes>,
     faults: BTreeMap<ComponentKey, Fault>,
@@ -99,12 +123,16 @@ pub struct Brain {
     /// Components that failed here and wait for their ladder's word.
     failed: BTreeSet<ComponentKey>,
     judge_due: bool,
+    usage_due: bool,
+    timer_at: Option<Instant>,
     drains: BTreeMap<ComponentKey, Instant>,
 
     plans: PlanDesk,
     moves: BTreeMap<ComponentKey, MoveWatch>,
     left: BTreeMap<(ComponentKey, RobotId), Instant>,
     desk: Desk,
+    desk_of_role: RoleDesk,
+    lease: Lease,
     duplicates_told: BTreeSet<core::net::SocketAddr>,
 }
 
@@ -144,6 +172,10 @@ impl Brain {
             started_at: now,
             handled_at: now,
             systems: BTreeMap::new(),
+            index: Index::default(),
+            stir: Stir::ALL,
+            look_at: now,
+            began: false,
             instances: BTreeMap::new(),
             instance_last: 0,
             runs: runs.collect(),
@@ -152,6 +184,7 @@ impl Brain {
             host: None,
             said: Said::default(),
             engines: BTreeMap::new(),
+            objectors: alloc::vec::Vec::new(),
             unreadable: BTreeMap::new(),
             faults: BTreeMap::new(),
             conditions: BTreeMap::new(),
@@ -160,14 +193,18 @@ impl Brain {
             held: BTreeMap::new(),
             failed: BTreeSet::new(),
             judge_due: false,
+            usage_due: false,
+            timer_at: None,
             drains: BTreeMap::new(),
             plans: PlanDesk::default(),
             moves: BTreeMap::new(),
             left: BTreeMap::new(),
             desk: Desk::default(),
+            desk_of_role: RoleDesk::default(),
+            lease: Lease::default(),
             duplicates_told: BTreeSet::new(),
         });
-        brain.refresh_systems();
+        brain.refresh_all_systems();
         brain.say_facts();
         brain.store_now();
         brain
@@ -180,13 +217,35 @@ impl Brain {
             self.mesh.forgive_pause(pause);
         }
         self.handled_at = now;
+        self.stir_for(&input);
+        self.take(now, input);
+        self.settle(now);
+    }
+
+    /// What an input makes worth looking at; datagrams do so by their news.
+    fn stir_for(&mut self, input: &Input) {
+        match input {
+            Input::Tick | Input::Datagram { .. } => {}
+            Input::Host(_) => self.judge_due = true,
+            Input::Usage(_) => self.usage_due = true,
+            Input::Facts(_)
+            | Input::Instance { .. }
+            | Input::Route { .. }
+            | Input::Deploy { .. }
+            | Input::Undeploy { .. }
+            | Input::MoveRole { .. }
+            | Input::RolePolicy { .. }
+            | Input::Planned { .. }
+            | Input::Stored { .. }
+            | Input::StoreFailed { .. } => self.stir = Stir::ALL,
+        }
+    }
+
+    fn take(&mut self, now: Instant, input: Input) {
         match input {
             Input::Tick => {}
             Input::Datagram { from, bytes } => self.mesh.handle_datagram(now, from, &bytes),
-            Input::Host(host) => {
-                self.host = Some(host);
-                self.judge_due = true;
-            }
+            Input::Host(host) => self.host = Some(host),
             Input::Facts(facts) => {
                 self.config.facts = *facts;
                 self.say_facts();
@@ -199,11 +258,12 @@ impl Brain {
             }
             Input::Deploy { request, system } => self.handle_deploy(request, system),
             Input::Undeploy { request, system } => self.handle_undeploy(request, &system),
+            Input::MoveRole { request, to } => self.handle_move_role(request, &to),
+            Input::RolePolicy { request, policy } => self.handle_role_policy(request, *policy),
             Input::Planned { plan, result } => self.handle_planned(now, plan, result),
             Input::Stored { ticket } => self.handle_stored(ticket),
             Input::StoreFailed { ticket, reason } => self.handle_store_failed(ticket, &reason),
         }
-        self.settle(now);
     }
 
     /// The next order to the shell.
@@ -213,19 +273,26 @@ impl Brain {
 
     /// When `Input::Tick` is due at the latest.
     pub fn next_deadline(&self) -> Option<Instant> {
+        // a timer that is already past was acted on and waits for something else
+        let timers = self.timers().filter(|at| *at > self.handled_at);
+        timers.chain([self.mesh.next_deadline(), self.look_at]).min()
+    }
+
+    /// All that is to be done at some time.
+    fn timers(&self) -> impl Iterator<Item = Instant> {
         let restarts = self.restarts.values().map(|restart| restart.at);
         let drains = self.drains.values().map(|since| *since + self.config.drain_max);
-        let timers = restarts
+        restarts
             .chain(drains)
             .chain(self.engines.values().filter_map(Engine::next_deadline))
             .chain(self.plans.next_deadline())
             .chain(self.instance_deadlines())
             .chain(self.move_deadlines())
             .chain(self.desk.retry_at())
-            .chain((!self.may_begin(self.handled_at)).then(|| self.begin_deadline()));
-        // a timer that is already past was acted on and waits for something else
-        let timers = timers.filter(|at| *at > self.handled_at);
-        timers.chain(Some(self.mesh.next_deadline())).min()
+            .chain(self.desk.store_at())
+            .chain(self.desk_of_role.wake_at)
+            .chain(self.lease.wake_at)
+            .chain((!self.began).then(|| self.begin_deadline()))
     }
 
     /// What this robot believes of the fleet, for the API.
@@ -238,6 +305,11 @@ impl Brain {
         &self.mesh
     }
 
+    /// Where the sent bytes of the mesh went.
+    pub fn mesh_traffic(&self) -> crate::mesh::MeshTraffic {
+        self.mesh.traffic()
+    }
+
     /// Counters of the mesh, for metrics.
     pub fn mesh_counters(&self) -> crate::mesh::MeshCounters {
         self.mesh.counters()
@@ -247,34 +319,61 @@ impl Brain {
     fn settle(&mut self, now: Instant) {
         self.mesh.handle_tick(now);
         self.take_news(now);
+        self.notice_time(now);
         self.consider_role(now);
+        if self.lease.wake_at.is_none_or(|at| now >= at) || self.stir.here {
+            self.keep_lease(now);
+        }
         // before anything is reconciled: what failed must not be started behind the ladder's back
         if self.judge_due || self.engines.values().any(|engine| engine.is_due(now)) {
             self.judge(now);
         }
-        self.decide(now);
-        self.reconcile(now);
+        for _ in 0..SETTLE_ROUNDS_MAX {
+            let stir = core::mem::take(&mut self.stir);
+            if !stir.any() {
+                break;
+            }
+            if stir.fleet {
+                self.decide(now);
+            }
+            if stir.here {
+                self.reconcile(now);
+                self.say_instances(now);
+                self.update_routes();
+            }
+        }
         self.say(now);
-        self.update_routes();
         self.store_if_dirty(now);
         if self.desk.may_speak() {
             while let Some((to, bytes)) = self.mesh.poll_send() {
                 self.effects.push_back(Effect::Send { to, bytes });
             }
         }
+        self.timer_at = self.timers().filter(|at| *at > now).min();
+    }
+
+    /// A timer passed, the start is over, or nothing was looked at for long.
+    fn notice_time(&mut self, now: Instant) {
+        let begins = !self.began && self.may_begin(now);
+        self.began |= begins;
+        if begins || now >= self.look_at || self.timer_at.is_some_and(|at| now >= at) {
+            self.stir = Stir::ALL;
+            self.look_at = now + LOOK_EVERY;
+        }
     }
 
     fn take_news(&mut self, now: Instant) {
-        let mut refresh = false;
+        let mut changed = Changed::default();
         while let Some(news) = self.mesh.poll_news() {
             match news {
-                MeshNews::Report(_) => {}
+                MeshNews::Report(_) => self.stir = Stir::ALL,
                 MeshNews::Record(key) => {
                     self.desk.mark_dirty();
-                    refresh |= systems::shapes_systems(key.kind);
+                    self.stir = Stir::ALL;
+                    changed.note(&key);
                 }
                 MeshNews::Alive(robot) => {
-                    let text = alloc::format!("{robot} is heard");
+                    let text = format!("{robot} is heard");
                     self.event("robot-alive", text);
                     if planted::is(Defect::RestartedByHeal) {
                         let ids: alloc::vec::Vec<InstanceId> =
@@ -282,19 +381,30 @@ impl Brain {
                         ids.into_iter().for_each(|id| self.finish(id));
                     }
                     self.plans.retry_soon();
+                    self.stir = Stir::ALL;
+                }
+                MeshNews::Quiet(robot) => {
+                    let text = format!("{robot} is quiet; it is asked, and others are");
+                    self.event("robot-quiet", text);
+                }
+                MeshNews::Isolated => {
+                    self.stir = Stir::ALL;
+                    self.event("isolated", "hears nobody; decides nothing for others");
+                }
+                MeshNews::Rejoined => {
+                    self.stir = Stir::ALL;
+                    self.event("rejoined", "hears others again");
                 }
                 MeshNews::Gone(robot) => self.note_gone(now, &robot),
                 MeshNews::DuplicateId(from) => {
                     if self.duplicates_told.len() < 16 && self.duplicates_told.insert(from) {
-                        let text = alloc::format!("{from} speaks under this robot's name");
+                        let text = format!("{from} speaks under this robot's name");
                         self.event("duplicate-robot-id", text);
                     }
                 }
             }
         }
-        if refresh {
-            self.refresh_systems();
-        }
+        self.refresh(&changed);
     }
 
     /// Whether this robot may start what it remembers: it is in step with a peer, or waited

@@ -109,10 +109,9 @@ impl Brain {
     /// which moves are done.
     pub(super) fn advance_moves(&mut self, now: Instant) {
         self.finish_moves(now);
-        let preparing: Vec<(ComponentKey, RobotId)> = self
-            .systems
-            .values()
-            .flat_map(|system| system.keys().collect::<Vec<_>>())
+        let standing_by: Vec<ComponentKey> = self.index.standing_by.iter().cloned().collect();
+        let preparing: Vec<(ComponentKey, RobotId)> = standing_by
+            .into_iter()
             .filter_map(|key| {
                 let (_, assignment) = self.wanted(&key)?;
                 Some((key, assignment.standbys.first()?.clone()))

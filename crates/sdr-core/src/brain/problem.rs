@@ -105,18 +105,17 @@ impl Brain {
             let usage = Needs { memory: report.usage.memory, cpu: report.usage.cpu };
             taken.insert(report.component, usage);
         }
-        for system in self.systems.values() {
-            for spec in &system.components {
-                let key = system.key(&spec.name);
-                let comes = self.wanted(&key).is_some_and(|(_, assignment)| {
-                    assignment.home == *robot || assignment.standbys.contains(robot)
-                });
-                if comes {
-                    let needs = taken.entry(key).or_default();
-                    needs.memory = needs.memory.max(spec.needs.memory);
-                    needs.cpu = needs.cpu.max(spec.needs.cpu);
-                }
-            }
+        let prepared = self.index.standing_by.iter().filter(|key| {
+            self.wanted(key).is_some_and(|(_, assignment)| assignment.standbys.contains(robot))
+        });
+        for key in self.index.at(robot).chain(prepared) {
+            let system = self.systems.get(&key.system);
+            let Some(spec) = system.and_then(|system| system.component(&key.name)) else {
+                continue;
+            };
+            let needs = taken.entry(key.clone()).or_default();
+            needs.memory = needs.memory.max(spec.needs.memory);
+            needs.cpu = needs.cpu.max(spec.needs.cpu);
         }
         taken.into_iter().filter(|(key, _)| !items.contains(key)).map(|(_, needs)| needs).collect()
     }
@@ -167,6 +166,7 @@ impl Brain {
             | Report::Host(_)
             | Report::Link(..)
             | Report::Condition(_)
+            | Report::Succession(_)
             | Report::Homeless(_) => None,
         });
         instances.collect()

@@ -1,6 +1,6 @@
 //! Every robot's part: what should be here against what is.
 
-use alloc::{collections::BTreeSet, format, vec::Vec};
+use alloc::format;
 
 use super::{Brain, instances::Told};
 use crate::{
@@ -30,10 +30,7 @@ pub(super) enum Duty {
 impl Brain {
     pub(super) fn reconcile(&mut self, now: Instant) {
         self.update_readiness(now);
-        let wanted = self.systems.values().flat_map(|system| system.keys().collect::<Vec<_>>());
-        let running = self.instances.values().map(|instance| instance.component.clone());
-        let keys: BTreeSet<ComponentKey> = wanted.chain(running).collect();
-        for key in keys {
+        for key in self.mine() {
             match self.duty(&key) {
                 Duty::None if planted::is(Defect::UnwantedGoesOn) => {}
                 Duty::None => self.leave(&key),
@@ -83,6 +80,10 @@ impl Brain {
             self.finish(id);
             return;
         }
+        if !self.may_act(now, key) {
+            self.be_silent(now, id, key);
+            return;
+        }
         let fits = match &instance.told {
             Told::Activate(token) => token.epoch == *epoch,
             Told::Nothing | Told::Deactivate | Told::Finish => false,
@@ -90,6 +91,15 @@ impl Brain {
         let able = matches!(instance.state, LifecycleState::Inactive | LifecycleState::Active);
         if !fits && able && self.predecessors_active(key) {
             self.activate(id, key, epoch);
+        }
+    }
+
+    /// It is the home, and must not act while nobody hears it.
+    fn be_silent(&mut self, now: Instant, id: InstanceId, key: &ComponentKey) {
+        if self.instances[&id].is_told_to_act() {
+            self.instances.get_mut(&id).expect("listed by the caller").told = Told::Deactivate;
+            self.command(id, Command::Deactivate);
+            self.stop_isolated(now, key);
         }
     }
 

@@ -8,7 +8,7 @@ use alloc::{
 
 use super::Brain;
 use crate::{
-    api::DeployAnswer,
+    api::{Accepted, DeployAnswer},
     effect::Effect,
     event::Event,
     id::Name,
@@ -45,6 +45,7 @@ impl Brain {
         });
         let revision = before.unwrap_or(0) + u64::from(!unchanged);
         let answer = DeployAnswer { system: name.to_string(), revision, changed: !unchanged };
+        let answer = Accepted::System(answer);
         if unchanged {
             self.effects.push_back(Effect::Answer { request, result: Ok(answer) });
             return;
@@ -84,13 +85,14 @@ impl Brain {
         let version = self.deployment_version(revision);
         let record = FleetRecord::new(RecordKind::SYSTEM, name.as_str().into(), version, &value);
         let answer = DeployAnswer { system: name.to_string(), revision, changed: true };
+        let answer = Accepted::System(answer);
         let mut event = Event::new("undeployed", &self.me, format!("{name}"));
         event.system = Some(name.clone());
         self.push_event(event);
         self.mint(alloc::vec![record], Some((request, answer)));
     }
 
-    fn refuse(&mut self, request: RequestId, reason: String) {
+    pub(super) fn refuse(&mut self, request: RequestId, reason: String) {
         self.effects.push_back(Effect::Answer { request, result: Err(reason) });
     }
 

@@ -1,18 +1,35 @@
-//! The coordinator role, simple form: the fittest alive takes it when nobody alive holds it.
+//! The coordinator role: who holds it, and how it is taken and told.
+//!
+//! The holder tells a few successors that it lives (`handover`); they, and later the others,
+//! take over when it is silent (`takeover`). The record is (term, holder); the greater wins.
 
-use alloc::{format, string::String, vec};
+use alloc::{format, string::String, vec, vec::Vec};
 
-use super::Brain;
+use super::{Brain, handover::Holding, takeover::Suspicion};
 use crate::{
-    event::Event,
     id::RobotId,
     mesh::FleetRecord,
     order::Version,
     planted::{self, Defect},
     record::{FleetValue, RecordKind, RoleRecord},
-    report::RolePreference,
-    time::Instant,
+    report::{Report, SuccessionReport},
+    time::{Duration, Instant},
 };
+
+/// News of another robot no older than two beats of the default gossip, with room for loss.
+const HEARD_WITHIN: Duration = Duration::from_millis(2500);
+
+/// What this robot remembers of the role beside the record.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RoleDesk {
+    pub(super) holding: Option<Holding>,
+    pub(super) suspicion: Option<Suspicion>,
+    /// It holds the role and hears nobody.
+    pub(super) suspended: bool,
+    pub(super) wake_at: Option<Instant>,
+    /// Why this robot takes the role, until it is on disk and said.
+    pub(super) why: String,
+}
 
 impl Brain {
     pub(super) fn role(&self) -> Option<&RoleRecord> {
@@ -26,52 +43,65 @@ impl Brain {
         self.role().map_or(0, |role| role.term)
     }
 
+    /// Whether this robot holds the role and may act on it.
     pub(super) fn is_coordinator(&self) -> bool {
-        self.role().is_some_and(|role| role.holder == self.me)
+        !self.desk_of_role.suspended && self.role().is_some_and(|role| role.holder == self.me)
     }
 
-    /// Takes the role when it is free, or held by one that should give way, and this robot
-    /// is the fittest of those alive.
     pub(super) fn consider_role(&mut self, now: Instant) {
-        if self.desk.is_minting() || self.desk.is_broken() || !self.may_stand(now) {
-            return;
+        if self.desk_of_role.wake_at.is_some_and(|at| now >= at) {
+            self.desk_of_role.wake_at = None;
         }
         let holder = self.role().map(|role| role.holder.clone());
-        let free = match &holder {
-            None => true,
-            Some(holder) if *holder == self.me => return,
-            Some(holder) if self.mesh.is_alive(holder) => self.gives_way(holder),
-            Some(_) => self.has_witness() && !planted::is(Defect::RoleNeverTaken),
-        };
-        let fittest = self.fittest().as_ref() == Some(&self.me);
-        if !free || !(fittest || planted::is(Defect::RoleTakenByAll)) {
-            return;
+        if holder.as_ref() != Some(&self.me) {
+            self.let_go();
         }
+        match holder {
+            Some(holder) if holder == self.me => self.hold(now),
+            Some(holder) => self.watch_holder(now, &holder),
+            None if self.may_stand(now) && self.is_first_choice() => {
+                let text = format!("fittest of {}", self.alive_robots().len());
+                self.take_role(&text);
+            }
+            None => {}
+        }
+    }
+
+    fn is_first_choice(&self) -> bool {
+        self.candidates().first() == Some(&self.me) || planted::is(Defect::RoleTakenByAll)
+    }
+
+    /// Takes the role under the next term.
+    pub(super) fn take_role(&mut self, why: &str) {
+        if !self.desk.is_minting() && !self.desk.is_broken() {
+            self.desk_of_role.suspicion = None;
+            let me = self.me.clone();
+            let record = self.role_record(&me, false);
+            self.desk_of_role.why = String::from(why);
+            self.mint(vec![record], None);
+        }
+    }
+
+    /// The role for `holder` under the next term.
+    pub(super) fn role_record(&self, holder: &RobotId, by_operator: bool) -> FleetRecord {
         let term = self.term() + 1;
-        let fitness = self.fitness(&self.me);
-        let value = FleetValue::Role(RoleRecord { holder: self.me.clone(), term, fitness });
-        let version = Version { epoch: None, revision: 0, term, author: self.me.clone() };
-        let record = FleetRecord::new(RecordKind::ROLE, String::new(), version, &value);
-        let text = match holder {
-            Some(holder) => format!("term {term}, after {holder}"),
-            None => format!("term {term}, fittest of {}", self.alive_robots().len()),
-        };
-        #[expect(clippy::cast_precision_loss, reason = "terms are small")]
-        let event = Event::new("role-taken", &self.me, text).number("term", term as f64);
-        self.push_event(event);
-        self.mint(vec![record], None);
+        let fitness = self.fitness(holder).points;
+        let value =
+            FleetValue::Role(RoleRecord { holder: holder.clone(), term, fitness, by_operator });
+        let version = Version { epoch: None, revision: 0, term, author: holder.clone() };
+        FleetRecord::new(RecordKind::ROLE, String::new(), version, &value)
     }
 
     /// Rule 3: a robot speaks for another only when it hears somebody besides, unless the
     /// fleet is too small for that.
     pub(super) fn has_witness(&self) -> bool {
         let known = self.mesh.authors().robots().count();
-        known <= 2 || self.mesh.alive().count() >= 1
+        known <= 2 || self.mesh.heard_directly(self.handled_at, HEARD_WITHIN) >= 1
     }
 
-    /// Whether it is known enough of the others to compare.
-    fn may_stand(&self, now: Instant) -> bool {
-        if self.config.facts.role == RolePreference::Forbidden {
+    /// Whether enough is known of the others to compare.
+    pub(super) fn may_stand(&self, now: Instant) -> bool {
+        if !self.may_hold(&self.me) || self.desk.is_minting() || self.desk.is_broken() {
             return false;
         }
         let known = self.alive_robots().iter().all(|robot| self.facts(robot).is_some());
@@ -81,31 +111,34 @@ impl Brain {
         known && (all_heard || waited)
     }
 
-    /// A holder without preference gives way to one that is preferred.
-    fn gives_way(&self, holder: &RobotId) -> bool {
-        let preference = |robot: &RobotId| self.facts(robot).map(|facts| facts.role);
-        preference(holder).is_some_and(|role| role != RolePreference::Preferred)
-            && self.config.facts.role == RolePreference::Preferred
+    /// What the holder said of its succession, when it speaks of the present term.
+    pub(super) fn succession(&self) -> Option<&SuccessionReport> {
+        let role = self.role()?;
+        let author = self.mesh.authors().author(&role.holder)?;
+        let said = author.reports().find_map(|report| match report {
+            Report::Succession(said) => Some(said),
+            Report::Facts(_)
+            | Report::Host(_)
+            | Report::Link(..)
+            | Report::Instance(_)
+            | Report::Condition(_)
+            | Report::Homeless(_) => None,
+        });
+        said.filter(|said| said.term == role.term)
     }
 
-    fn fittest(&self) -> Option<RobotId> {
-        let robots = self.alive_robots();
-        let able = robots.into_iter().filter(|robot| {
-            self.facts(robot).is_some_and(|facts| facts.role != RolePreference::Forbidden)
-        });
-        // the first of equals by name, on every robot
-        able.max_by(|a, b| self.fitness(a).cmp(&self.fitness(b)).then_with(|| b.cmp(a)))
+    pub(super) fn wake_for_role(&mut self, at: Instant) {
+        let wake = &mut self.desk_of_role.wake_at;
+        *wake = Some(wake.map_or(at, |before| before.min(at)));
     }
 
-    /// Preference, then battery and radio in coarse steps, so that noise decides nothing.
-    fn fitness(&self, robot: &RobotId) -> u32 {
-        let preferred =
-            self.facts(robot).is_some_and(|facts| facts.role == RolePreference::Preferred);
-        let host = self.host_of(robot).copied().unwrap_or_default();
-        let battery = host.battery.map_or(10, |battery| battery.0 / 100).min(10);
-        let radio = host.rssi.map_or(10, |rssi| {
-            u32::try_from((i32::from(rssi.tenths()) + 1000).clamp(0, 500) / 100).unwrap_or(0)
-        });
-        u32::from(preferred) * 1000 + battery * 10 + radio
+    /// Living robots that may follow the holder, the best first.
+    pub(super) fn successors(&self) -> Vec<RobotId> {
+        self.candidates().into_iter().filter(|robot| *robot != self.me).collect()
     }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "terms are small")]
+pub(super) fn count(term: u64) -> f64 {
+    term as f64
 }

@@ -5,7 +5,7 @@ use alloc::{collections::BTreeSet, vec::Vec};
 use super::{Brain, instances::Told, reconcile::Duty, systems::SystemNow};
 use crate::{
     effect::{Direction, Effect, Route},
-    id::{ComponentKey, RobotId},
+    id::{ComponentKey, Name, RobotId},
     order::Token,
     planted::{self, Defect},
     spec::{ConnectionSpec, Qos, Reliability, port_path},
@@ -15,7 +15,9 @@ impl Brain {
     /// Tells the data plane when the wanted set changed.
     pub(super) fn update_routes(&mut self) {
         let mut routes = Vec::new();
-        for system in self.systems.values() {
+        let mut names: Vec<&Name> = self.index.mine.iter().map(|key| &key.system).collect();
+        names.dedup();
+        for system in names.into_iter().filter_map(|name| self.systems.get(name)) {
             self.routes_of(system, &mut routes);
         }
         if routes != self.routes {
@@ -26,7 +28,10 @@ impl Brain {
     }
 
     fn routes_of(&self, system: &SystemNow, routes: &mut Vec<Route>) {
-        let outputs: BTreeSet<_> = system.connections.iter().map(|c| c.from.clone()).collect();
+        let mine = |name: &Name| self.index.mine.contains(&system.key(name));
+        let touching =
+            system.connections.iter().filter(|c| mine(&c.from.component) || mine(&c.to.component));
+        let outputs: BTreeSet<_> = touching.map(|c| c.from.clone()).collect();
         for output in outputs {
             let producer = system.key(&output.component);
             let wires: Vec<&ConnectionSpec> =

@@ -86,9 +86,10 @@ impl Brain {
     }
 
     pub(super) fn say(&mut self, now: Instant) {
-        self.update_readiness(now);
         self.unsay_unwanted();
-        self.say_instances(now);
+        if core::mem::take(&mut self.usage_due) {
+            self.say_instances(now);
+        }
         self.say_host(now);
         self.say_links(now);
     }
@@ -118,7 +119,7 @@ impl Brain {
     }
 
     /// States and tokens at once, figures when they changed enough.
-    fn say_instances(&mut self, now: Instant) {
+    pub(super) fn say_instances(&mut self, now: Instant) {
         let mut spoken: BTreeSet<ComponentKey> = BTreeSet::new();
         let ids: Vec<InstanceId> = self.instances.keys().copied().collect();
         for id in ids {

@@ -22,6 +22,7 @@ impl Brain {
             seen_from: self.me.to_string(),
             coordinator: self.role().map(|role| role.holder.to_string()),
             term: self.term(),
+            role: self.role_view(),
             robots: self.mesh.authors().robots().map(|robot| self.robot_view(robot, now)).collect(),
             systems: self.systems.values().map(|system| self.system_view(system)).collect(),
             conditions: self.condition_views(now),
@@ -56,6 +57,7 @@ impl Brain {
                     | Report::Host(_)
                     | Report::Link(..)
                     | Report::Instance(_)
+                    | Report::Succession(_)
                     | Report::Homeless(_) => None,
                 })
                 .collect(),
@@ -142,6 +144,7 @@ impl Brain {
         let found = reports.find_map(|report| match report {
             Report::Homeless(homeless) if homeless.component == *key => Some(&homeless.refusals),
             Report::Homeless(_)
+            | Report::Succession(_)
             | Report::Facts(_)
             | Report::Host(_)
             | Report::Link(..)

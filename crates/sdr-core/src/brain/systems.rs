@@ -1,12 +1,18 @@
 //! Systems that should run, put together from their records.
 
-use alloc::{collections::BTreeMap, format, string::ToString, vec::Vec};
+use alloc::{
+    collections::BTreeSet,
+    format,
+    string::{String, ToString},
+    sync::Arc,
+    vec::Vec,
+};
 
 use super::Brain;
 use crate::{
     id::{ComponentKey, Name, RobotId},
     order::Version,
-    record::{Assignment, FleetValue, RecordKind, SystemRecord},
+    record::{Assignment, FleetKey, FleetValue, RecordKind, SystemRecord},
     spec::{ComponentSpec, ConnectionSpec, PolicyBytes},
 };
 
@@ -40,57 +46,103 @@ impl SystemNow {
     }
 }
 
-/// Whether a record of this kind is part of a [`SystemNow`].
-pub(super) fn shapes_systems(kind: RecordKind) -> bool {
-    kind != RecordKind::ASSIGNMENT && kind != RecordKind::ROLE
+/// Records that changed, by what has to be put together anew.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Changed {
+    systems: BTreeSet<String>,
+    assignments: BTreeSet<String>,
+}
+
+impl Changed {
+    pub(super) fn note(&mut self, key: &FleetKey) {
+        match key.kind {
+            RecordKind::ASSIGNMENT => {
+                self.assignments.insert(key.name.clone());
+            }
+            RecordKind::SYSTEM
+            | RecordKind::COMPONENT
+            | RecordKind::CONNECTION
+            | RecordKind::ALLOCATION
+            | RecordKind::RECOVERY => {
+                let system = key.name.split('/').next().unwrap_or(&key.name);
+                self.systems.insert(system.into());
+            }
+            _ => {}
+        }
+    }
 }
 
 impl Brain {
-    /// Puts all wanted systems together anew; incomplete ones keep their last whole form.
-    pub(super) fn refresh_systems(&mut self) {
-        let mut systems = BTreeMap::new();
-        let fleet = self.mesh.fleet();
-        for (_, version, value) in fleet.of_kind(RecordKind::SYSTEM) {
-            let FleetValue::System(record) = value else { continue };
-            if !record.wanted {
-                continue;
-            }
-            match self.assemble(version.revision, record) {
-                Some(system) => systems.insert(record.name.clone(), system),
-                None => match self.systems.get(&record.name) {
-                    Some(before) => systems.insert(record.name.clone(), before.clone()),
-                    None => None,
-                },
-            };
+    /// Puts everything together from the records.
+    pub(super) fn refresh_all_systems(&mut self) {
+        let mut changed = Changed::default();
+        for kind in [RecordKind::SYSTEM, RecordKind::ASSIGNMENT] {
+            self.mesh.fleet().of_kind(kind).for_each(|(key, _, _)| changed.note(key));
         }
-        let before = core::mem::replace(&mut self.systems, systems);
-        let redeployed = |system: &&SystemNow| {
-            before.get(&system.name).is_some_and(|old| old.revision != system.revision)
+        self.refresh(&changed);
+    }
+
+    /// Puts together anew what changed.
+    pub(super) fn refresh(&mut self, changed: &Changed) {
+        let mut keys: BTreeSet<ComponentKey> = BTreeSet::new();
+        for name in &changed.systems {
+            self.refresh_system(name, &mut keys);
+        }
+        for name in &changed.assignments {
+            let found = self.mesh.fleet().get(RecordKind::ASSIGNMENT, name);
+            if let Some((_, FleetValue::Assignment(assignment))) = found {
+                keys.insert(assignment.component.clone());
+            }
+        }
+        for key in keys {
+            self.reindex(&key);
+        }
+    }
+
+    /// One system as it is now; an incomplete one keeps its last whole form.
+    fn refresh_system(&mut self, name: &str, keys: &mut BTreeSet<ComponentKey>) {
+        let Some((version, FleetValue::System(record))) =
+            self.mesh.fleet().get(RecordKind::SYSTEM, name)
+        else {
+            return;
         };
-        let keys: Vec<ComponentKey> = self
-            .systems
-            .values()
-            .filter(redeployed)
-            .flat_map(|s| s.keys().collect::<Vec<_>>())
-            .collect();
-        // an operator's new revision is a fresh chance for what was given up
-        keys.iter().for_each(|key| self.forget_here(key));
+        let wanted = record.wanted;
+        let name = record.name.clone();
+        let whole = wanted.then(|| self.assemble(version.revision, record)).flatten();
+        let before = self.systems.get(&name).cloned();
+        if wanted && whole.is_none() {
+            return;
+        }
+        let redeployed = matches!(
+            (&before, &whole), (Some(old), Some(new)) if old.revision != new.revision
+        );
+        let new = whole.map(Arc::new);
+        keys.extend(before.iter().chain(&new).flat_map(|s| s.keys().collect::<Vec<_>>()));
+        match new {
+            Some(system) => self.systems.insert(name, system),
+            None => self.systems.remove(&name),
+        };
+        self.update_objectors();
+        if redeployed {
+            // an operator's new revision is a fresh chance for what was given up
+            keys.iter().for_each(|key| self.forget_here(key));
+        }
     }
 
     fn assemble(&self, revision: u64, record: &SystemRecord) -> Option<SystemNow> {
         let fleet = self.mesh.fleet();
         let prefix = format!("{}/", record.name);
-        let current = |key: &crate::record::FleetKey, version: &Version| {
+        let current = |key: &FleetKey, version: &Version| {
             key.name.starts_with(&prefix) && version.revision == revision
         };
         let mut components = Vec::new();
-        for (key, version, value) in fleet.of_kind(RecordKind::COMPONENT) {
+        for (key, version, value) in fleet.below(RecordKind::COMPONENT, &prefix) {
             if let (true, FleetValue::Component(spec)) = (current(key, version), value) {
                 components.push(spec.clone());
             }
         }
         let mut connections = Vec::new();
-        for (key, version, value) in fleet.of_kind(RecordKind::CONNECTION) {
+        for (key, version, value) in fleet.below(RecordKind::CONNECTION, &prefix) {
             if let (true, FleetValue::Connection(spec)) = (current(key, version), value) {
                 connections.push(spec.clone());
             }
@@ -156,6 +208,7 @@ impl Brain {
             | crate::report::Report::Host(_)
             | crate::report::Report::Link(..)
             | crate::report::Report::Condition(_)
+            | crate::report::Report::Succession(_)
             | crate::report::Report::Homeless(_) => None,
         })
     }
@@ -167,6 +220,7 @@ impl Brain {
             | crate::report::Report::Host(_)
             | crate::report::Report::Link(..)
             | crate::report::Report::Condition(_)
+            | crate::report::Report::Succession(_)
             | crate::report::Report::Homeless(_) => None,
         })
     }
@@ -178,6 +232,7 @@ impl Brain {
             | crate::report::Report::Facts(_)
             | crate::report::Report::Link(..)
             | crate::report::Report::Condition(_)
+            | crate::report::Report::Succession(_)
             | crate::report::Report::Homeless(_) => None,
         })
     }

@@ -1,327 +1,258 @@
-//! What each robot says of itself: (robot, incarnation) -> heartbeat and keyed records with
-//! sequence numbers.
+//! What each robot says of itself, and who is known at all.
+//!
+//! Every robot ever heard of has a seat: a small number that stays, so that nothing on the
+//! path of a datagram compares names. Seat 0 is this robot's own.
 
 use alloc::{
     collections::{BTreeMap, BTreeSet},
-    format,
-    string::String,
     vec::Vec,
 };
 
-use serde::{Deserialize, Serialize};
-
-use super::wire::{AuthorDelta, AuthorStamp};
-use crate::{
-    id::{ComponentKey, Name, RobotId},
-    recover::Cause,
-    report::Report,
+use super::{
+    author::{Author, AuthorKey, Incarnation},
+    wire::{cut, last_of},
 };
+use crate::{id::RobotId, report::Report};
 
-/// Most authors known; more are refused.
+/// Most robots known; more are refused.
 pub(super) const AUTHORS_MAX: usize = 2000;
-/// Most records of one author.
-const RECORDS_MAX: usize = 2048;
-/// Longest record of an author, so that a delta of one fits a datagram.
-pub(super) const VALUE_BYTES_MAX: usize = 900;
 
-/// Most bytes of an encoded stamp with what frames it.
-pub(super) const STAMP_BYTES_MAX: usize = 80;
+/// The place of a robot in all tables of this mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Seat(usize);
 
-/// Which life of a robot speaks: counter first, then nonce.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
-pub struct Incarnation {
-    /// Grows with each start.
-    pub counter: u64,
-    /// Random, so that two robots of one name are told apart.
-    pub nonce: u32,
+impl Seat {
+    /// This robot's.
+    pub(super) const OWN: Self = Self(0);
+
+    pub(super) fn at(index: usize) -> Self {
+        Self(index)
+    }
+
+    pub(super) fn index(self) -> usize {
+        self.0
+    }
 }
 
-/// Names one record of an author.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct AuthorKey(String);
+/// What the table says to a robot with its incarnation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Admission {
+    /// It has this seat.
+    Known(Seat),
+    /// It took this seat just now, or sits there under a greater incarnation than before.
+    New(Seat),
+    /// It has this seat under a greater incarnation.
+    Outdated(Seat),
+    /// No room.
+    Full,
+}
 
-impl AuthorKey {
-    /// The key of an instance's report.
-    pub fn instance(component: &ComponentKey) -> Self {
-        Self(format!("i/{component}"))
-    }
-
-    /// The key of a condition.
-    pub fn condition(system: &Name, cause: Cause) -> Self {
-        Self(format!("c/{system}/{cause}"))
-    }
-
-    /// The key of what the coordinator says of a component without a home.
-    pub fn homeless(component: &ComponentKey) -> Self {
-        Self(format!("n/{component}"))
-    }
-
-    fn of(report: &Report) -> Self {
-        match report {
-            Report::Facts(_) => Self(String::from("f")),
-            Report::Host(_) => Self(String::from("h")),
-            Report::Link(robot, _) => Self(format!("l/{robot}")),
-            Report::Instance(instance) => Self::instance(&instance.component),
-            Report::Condition(condition) => Self::condition(&condition.system, condition.cause),
-            Report::Homeless(homeless) => Self::homeless(&homeless.component),
+impl Admission {
+    /// Its seat, when it speaks under the greatest incarnation known.
+    pub(super) fn seat(self) -> Option<Seat> {
+        match self {
+            Self::Known(seat) | Self::New(seat) => Some(seat),
+            Self::Outdated(_) | Self::Full => None,
         }
     }
 }
 
-#[derive(Clone, Debug)]
-struct Entry {
-    sequence: u64,
-    value: Vec<u8>,
-    /// `None` for a record taken back, or of a later version.
-    report: Option<Report>,
-}
-
-/// One robot as it describes itself.
-#[derive(Clone, Debug)]
-pub struct Author {
-    incarnation: Incarnation,
-    heartbeat: u64,
-    sequence: u64,
-    entries: BTreeMap<AuthorKey, Entry>,
-}
-
-impl Author {
-    fn new(incarnation: Incarnation) -> Self {
-        Self { incarnation, heartbeat: 0, sequence: 0, entries: BTreeMap::new() }
-    }
-
-    /// All it says at present, by key.
-    pub fn reports(&self) -> impl Iterator<Item = &Report> {
-        self.entries.values().filter_map(|entry| entry.report.as_ref())
-    }
-}
-
-/// What came of a stamp or delta.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Learned {
-    /// The author lives: its heartbeat or records advanced.
-    pub(super) fresh: bool,
-    /// At least one record is new.
-    pub(super) records: bool,
-    /// Records before these are lacking: ask for them.
-    pub(super) gap: bool,
-    /// Records that could not be taken.
-    pub(super) refused: u64,
+/// Whom a shortened id stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lookup {
+    One(Seat),
+    Unknown,
+    Ambiguous,
 }
 
 /// All authors, this robot among them.
 #[derive(Clone, Debug)]
 pub struct AuthorTable {
-    me: RobotId,
-    authors: BTreeMap<RobotId, Author>,
+    seats: Vec<Author>,
+    by_name: BTreeMap<RobotId, Seat>,
+    /// All ids, sorted, and the seat of each: looked through for every beat.
+    ids: Vec<u32>,
+    id_seats: Vec<Seat>,
+    /// XOR over all ids.
+    hash: u32,
+    /// Own records that changed and wait for their release.
+    staged: BTreeSet<AuthorKey>,
 }
 
 impl AuthorTable {
     pub(super) fn new(me: RobotId, own: Incarnation) -> Self {
-        let authors = BTreeMap::from([(me.clone(), Author::new(own))]);
-        Self { me, authors }
+        let author = Author::new(me.clone(), own);
+        Self {
+            hash: author.id,
+            by_name: BTreeMap::from([(me, Seat::OWN)]),
+            ids: Vec::from([author.id]),
+            id_seats: Vec::from([Seat::OWN]),
+            seats: Vec::from([author]),
+            staged: BTreeSet::new(),
+        }
     }
 
     /// All robots ever heard of, this one included, by name.
     pub fn robots(&self) -> impl Iterator<Item = &RobotId> {
-        self.authors.keys()
+        self.by_name.keys()
     }
 
     /// What `robot` says at present.
     pub fn author(&self, robot: &RobotId) -> Option<&Author> {
-        self.authors.get(robot)
+        self.by_name.get(robot).map(|seat| &self.seats[seat.0])
     }
 
-    pub(super) fn beat(&mut self, heartbeat: u64) {
-        self.own().heartbeat = heartbeat;
+    pub(super) fn seat(&self, robot: &RobotId) -> Option<Seat> {
+        self.by_name.get(robot).copied()
+    }
+
+    pub(super) fn at(&self, seat: Seat) -> &Author {
+        &self.seats[seat.0]
+    }
+
+    pub(super) fn at_mut(&mut self, seat: Seat) -> &mut Author {
+        &mut self.seats[seat.0]
+    }
+
+    /// Robots known, this one included.
+    pub(super) fn count(&self) -> usize {
+        self.seats.len()
+    }
+
+    /// Hash over all robots known and their incarnations.
+    pub(super) fn hash(&self) -> u32 {
+        self.hash
+    }
+
+    /// Whom the id in a beat stands for.
+    pub(super) fn lookup(&self, id: u32, wide: bool) -> Lookup {
+        let low = cut(id, wide);
+        let mut found = self.ids(low, last_of(low, wide));
+        match (found.next(), found.next()) {
+            (Some((_, seat)), None) => Lookup::One(seat),
+            (None, _) => Lookup::Unknown,
+            (Some(_), Some(_)) => Lookup::Ambiguous,
+        }
+    }
+
+    /// Whom a whole id stands for.
+    pub(super) fn by_id(&self, id: u32) -> Option<Seat> {
+        self.ids(id, id).next().map(|(_, seat)| seat)
+    }
+
+    /// All ids in a range, with their seats.
+    pub(super) fn ids(&self, low: u32, high: u32) -> impl Iterator<Item = (u32, Seat)> {
+        let first = self.place(low);
+        let ids = self.ids[first..].iter().copied();
+        ids.zip(self.id_seats[first..].iter().copied()).take_while(move |(id, _)| *id <= high)
+    }
+
+    /// Index of the first id that is not less than `id`. Ids are hashes, evenly spread: the
+    /// place is near where their share of all numbers says.
+    fn place(&self, id: u32) -> usize {
+        let guess = (u64::from(id) * self.ids.len() as u64) >> 32;
+        let mut place = usize::try_from(guess).unwrap_or(0);
+        while place > 0 && self.ids[place - 1] >= id {
+            place -= 1;
+        }
+        while place < self.ids.len() && self.ids[place] < id {
+            place += 1;
+        }
+        place
+    }
+
+    /// The seat of a robot under an incarnation; a new seat, or the old one emptied, when
+    /// that is news.
+    pub(super) fn admit(&mut self, robot: &RobotId, incarnation: Incarnation) -> Admission {
+        match self.by_name.get(robot) {
+            Some(seat) => {
+                let known = self.seats[seat.0].incarnation;
+                match incarnation.cmp(&known) {
+                    core::cmp::Ordering::Equal => Admission::Known(*seat),
+                    core::cmp::Ordering::Less => Admission::Outdated(*seat),
+                    core::cmp::Ordering::Greater if *seat == Seat::OWN => Admission::Known(*seat),
+                    core::cmp::Ordering::Greater => {
+                        let seat = *seat;
+                        self.replace(seat, Author::new(robot.clone(), incarnation));
+                        Admission::New(seat)
+                    }
+                }
+            }
+            None if self.seats.len() >= AUTHORS_MAX => Admission::Full,
+            None => {
+                let seat = Seat(self.seats.len());
+                let author = Author::new(robot.clone(), incarnation);
+                self.hash ^= author.id;
+                self.by_name.insert(robot.clone(), seat);
+                self.index(author.id, seat);
+                self.seats.push(author);
+                Admission::New(seat)
+            }
+        }
     }
 
     /// Speaks under a greater incarnation from now on; everything is said anew.
     pub(super) fn reincarnate(&mut self, incarnation: Incarnation) {
-        let own = self.own();
-        own.incarnation = incarnation;
-        let mut sequence = 0;
-        for entry in own.entries.values_mut() {
-            sequence += 1;
-            entry.sequence = sequence;
-        }
-        own.sequence = sequence;
+        let mut own = self.seats[Seat::OWN.0].clone();
+        own.reincarnate(incarnation);
+        self.replace(Seat::OWN, own);
     }
 
-    /// Whether the record changed.
-    pub(super) fn set_own(&mut self, report: &Report) -> bool {
-        let value = postcard::to_allocvec(report).expect("writing plain data cannot fail");
-        let own = self.own();
+    /// Puts an own record down; whether it changed.
+    pub(super) fn stage(&mut self, report: &Report) -> bool {
         let key = AuthorKey::of(report);
-        if value.len() > VALUE_BYTES_MAX
-            || own.entries.get(&key).is_some_and(|entry| entry.value == value)
-        {
-            return false;
+        let changed = self.seats[Seat::OWN.0].stage(&key, report);
+        if changed {
+            self.staged.insert(key);
         }
-        own.sequence += 1;
-        let entry = Entry { sequence: own.sequence, value, report: Some(report.clone()) };
-        own.entries.insert(key, entry);
-        true
+        changed
     }
 
-    /// Whether there was something to take back.
-    pub(super) fn remove_own(&mut self, key: &AuthorKey) -> bool {
-        let own = self.own();
-        let sequence = own.sequence + 1;
-        match own.entries.get_mut(key) {
-            Some(entry) if !entry.value.is_empty() => {
-                *entry = Entry { sequence, value: Vec::new(), report: None };
-                own.sequence = sequence;
-                true
-            }
-            Some(_) | None => false,
+    /// Takes an own record back; whether there was one.
+    pub(super) fn unstage(&mut self, key: &AuthorKey) -> bool {
+        let changed = self.seats[Seat::OWN.0].unstage(key);
+        if changed {
+            self.staged.insert(key.clone());
+        }
+        changed
+    }
+
+    /// Lets others hear of staged records, as many as take `bytes`, one at least.
+    pub(super) fn release(&mut self, bytes: usize) {
+        let mut used = 0;
+        while used < bytes {
+            let Some(key) = self.staged.pop_first() else { break };
+            used += self.seats[Seat::OWN.0].release(&key);
         }
     }
 
-    /// How far each author is known.
-    pub(super) fn stamps(&self) -> impl Iterator<Item = AuthorStamp> {
-        self.authors.iter().map(|(robot, author)| stamp(robot, author, author.sequence))
-    }
-
-    /// Takes the news in a stamp: a greater heartbeat is a sign of life.
-    pub(super) fn hear(&mut self, heard: &AuthorStamp) -> Learned {
-        let Some(author) = self.admit(heard) else { return Learned::default() };
-        let fresh = heard.incarnation == author.incarnation && heard.heartbeat > author.heartbeat;
-        if fresh {
-            author.heartbeat = heard.heartbeat;
+    /// Lets others hear of one record.
+    pub(super) fn release_one(&mut self, key: &AuthorKey) {
+        if self.staged.remove(key) {
+            self.seats[Seat::OWN.0].release(key);
         }
-        Learned { fresh, ..Learned::default() }
     }
 
-    /// Takes records; those not newer than what is known are skipped.
-    pub(super) fn learn(&mut self, delta: &AuthorDelta) -> Learned {
-        let mut learned = self.hear(&delta.stamp);
-        let Some(author) = self.admit(&delta.stamp) else { return learned };
-        if delta.stamp.incarnation != author.incarnation {
-            return learned;
+    /// Whether records wait for their release.
+    pub(super) fn has_staged(&self) -> bool {
+        !self.staged.is_empty()
+    }
+
+    fn replace(&mut self, seat: Seat, author: Author) {
+        let before = self.seats[seat.0].id;
+        let entry = self.ids.iter().zip(&self.id_seats).position(|(_, known)| *known == seat);
+        if let Some(place) = entry {
+            self.ids.remove(place);
+            self.id_seats.remove(place);
         }
-        if delta.since > author.sequence {
-            learned.gap = true;
-            return learned;
-        }
-        for (sequence, key, value) in &delta.records {
-            if *sequence <= author.sequence {
-                continue;
-            }
-            if value.len() > VALUE_BYTES_MAX || author.entries.len() >= RECORDS_MAX {
-                learned.refused += 1;
-                continue;
-            }
-            let report = postcard::take_from_bytes(value).ok().map(|(report, _later)| report);
-            let entry = Entry { sequence: *sequence, value: value.clone(), report };
-            author.entries.insert(AuthorKey(key.clone()), entry);
-            learned.records = true;
-        }
-        if delta.stamp.sequence > author.sequence {
-            author.sequence = delta.stamp.sequence;
-            learned.fresh = true;
-        }
-        learned
+        self.hash ^= before ^ author.id;
+        self.index(author.id, seat);
+        self.seats[seat.0] = author;
     }
 
-    /// Records of `robot` that somebody at `known` lacks, as many as fit `room` bytes.
-    pub(super) fn delta(
-        &self,
-        robot: &RobotId,
-        known: Option<&AuthorStamp>,
-        room: usize,
-    ) -> Option<AuthorDelta> {
-        let author = self.authors.get(robot)?;
-        let since = match known {
-            Some(known) if known.incarnation > author.incarnation => return None,
-            Some(known) if known.incarnation == author.incarnation => known.sequence,
-            Some(_) | None => 0,
-        };
-        let behind = known.is_none_or(|known| known.incarnation < author.incarnation);
-        if !behind && since >= author.sequence {
-            return None;
-        }
-        delta_since(robot, author, since, room)
-    }
-
-    /// Records of this robot made after `since`.
-    pub(super) fn own_delta(&self, since: u64, room: usize) -> Option<AuthorDelta> {
-        delta_since(&self.me, self.authors.get(&self.me)?, since, room)
-    }
-
-    /// The greatest sequence of this robot's records.
-    pub(super) fn own_sequence(&self) -> u64 {
-        self.authors.get(&self.me).map_or(0, |own| own.sequence)
-    }
-
-    /// Whether `heard` goes further than what is known of that author.
-    pub(super) fn is_behind(&self, heard: &AuthorStamp) -> bool {
-        heard.robot != self.me
-            && self.authors.get(&heard.robot).is_none_or(|author| {
-                (heard.incarnation, heard.sequence) > (author.incarnation, author.sequence)
-            })
-    }
-
-    /// How far one author is known.
-    pub(super) fn stamp_of(&self, robot: &RobotId) -> Option<AuthorStamp> {
-        self.authors.get(robot).map(|author| stamp(robot, author, author.sequence))
-    }
-
-    /// The author a stamp speaks of, made new for a greater incarnation; `None` for this
-    /// robot itself and when there is no room.
-    fn admit(&mut self, heard: &AuthorStamp) -> Option<&mut Author> {
-        if heard.robot == self.me {
-            return None;
-        }
-        let full = self.authors.len() >= AUTHORS_MAX;
-        if full && !self.authors.contains_key(&heard.robot) {
-            return None;
-        }
-        let author = self
-            .authors
-            .entry(heard.robot.clone())
-            .or_insert_with(|| Author::new(heard.incarnation));
-        if heard.incarnation > author.incarnation {
-            *author = Author::new(heard.incarnation);
-        }
-        Some(author)
-    }
-
-    fn own(&mut self) -> &mut Author {
-        self.authors.get_mut(&self.me).expect("this robot is an author from the start")
-    }
-}
-
-/// Records after `since`, oldest first, as many as fit `room` bytes.
-fn delta_since(robot: &RobotId, author: &Author, since: u64, room: usize) -> Option<AuthorDelta> {
-    let lacking: BTreeSet<(u64, &AuthorKey)> = author
-        .entries
-        .iter()
-        .filter(|(_, entry)| entry.sequence > since)
-        .map(|(key, entry)| (entry.sequence, key))
-        .collect();
-    let mut records: Vec<(u64, String, Vec<u8>)> = Vec::new();
-    let mut used = STAMP_BYTES_MAX;
-    let mut reached = author.sequence;
-    for (sequence, key) in lacking {
-        let value = &author.entries[key].value;
-        used += value.len() + key.0.len() + 16;
-        if used > room {
-            reached = records.last().map(|(sequence, ..)| *sequence)?;
-            break;
-        }
-        records.push((sequence, key.0.clone(), value.clone()));
-    }
-    Some(AuthorDelta { stamp: stamp(robot, author, reached), since, records })
-}
-
-fn stamp(robot: &RobotId, author: &Author, sequence: u64) -> AuthorStamp {
-    AuthorStamp {
-        robot: robot.clone(),
-        incarnation: author.incarnation,
-        heartbeat: author.heartbeat,
-        sequence,
+    fn index(&mut self, id: u32, seat: Seat) {
+        let place = self.place(id);
+        self.ids.insert(place, id);
+        self.id_seats.insert(place, seat);
     }
 }

@@ -1,10 +1,17 @@
 //! What the fleet agrees on: key -> (version, value), merged by greatest version.
 
-use alloc::{collections::BTreeMap, string::String, vec, vec::Vec};
+use alloc::{
+    collections::{BTreeMap, BTreeSet},
+    string::String,
+    vec::Vec,
+};
 
 use serde::{Deserialize, Serialize};
 
-use super::wire::FleetBucket;
+use super::{
+    fleet_tree::{FleetTree, range_of},
+    wire::{FleetEntries, SECTION_BYTES_MAX},
+};
 use crate::{
     effect::StoredRecord,
     order::{Version, hash64},
@@ -12,10 +19,8 @@ use crate::{
     record::{FleetKey, FleetValue, RECORD_BYTES_MAX, RecordKind},
 };
 
-/// Buckets of the digest.
-pub(super) const BUCKETS: usize = 16;
 /// Most records; more are refused.
-const RECORDS_MAX: usize = 16_384;
+const RECORDS_MAX: usize = 65_536;
 /// Longest name of a key.
 const KEY_BYTES_MAX: usize = 100;
 
@@ -41,6 +46,14 @@ impl FleetRecord {
         (&self.version, hash64(&self.value), &self.value)
     }
 
+    /// Bytes in a datagram, at most.
+    pub(super) fn wire_len(&self) -> usize {
+        let epoch = self.version.epoch.as_ref();
+        let epoch = epoch.map_or(1, |epoch| epoch.minted_by.as_str().len() + 12);
+        let version = epoch + 20 + self.version.author.as_str().len() + 1;
+        self.value.len() + self.key.name.len() + version + 6
+    }
+
     fn stamp(&self) -> u32 {
         let bytes = postcard::to_allocvec(&self.version).expect("plain data");
         fold(hash64(&bytes) ^ hash64(&self.value).rotate_left(17))
@@ -64,6 +77,9 @@ pub enum Merge {
 #[derive(Clone, Debug, Default)]
 pub struct FleetTable {
     records: BTreeMap<FleetKey, (FleetRecord, FleetValue)>,
+    /// (key hash, key) of all records.
+    hashes: BTreeSet<(u32, FleetKey)>,
+    tree: FleetTree,
 }
 
 impl FleetTable {
@@ -88,7 +104,10 @@ impl FleetTable {
 
     /// Takes `record` when it is greater than what is known.
     pub fn merge(&mut self, record: FleetRecord) -> Merge {
-        if record.value.len() > RECORD_BYTES_MAX || record.key.name.len() > KEY_BYTES_MAX {
+        if record.value.len() > RECORD_BYTES_MAX
+            || record.key.name.len() > KEY_BYTES_MAX
+            || record.wire_len() > SECTION_BYTES_MAX
+        {
             return Merge::Refused;
         }
         let Ok(value) = FleetValue::decode(record.key.kind, &record.value) else {
@@ -115,13 +134,12 @@ impl FleetTable {
             | FleetValue::Recovery(_)
             | FleetValue::Assignment(_)
             | FleetValue::Role(_)
+            | FleetValue::RolePolicy(_)
             | FleetValue::Unknown => None,
         };
-        self.records.insert(record.key.clone(), (record, value));
+        self.put(record, value);
         if planted::is(Defect::TombstoneDropped) {
-            self.records.retain(
-                |_, (_, value)| !matches!(value, FleetValue::System(system) if !system.wanted),
-            );
+            self.drop_tombstones();
         }
         if let Some((name, revision)) = system {
             self.drop_parts_before(&name, revision);
@@ -152,6 +170,19 @@ impl FleetTable {
             .map(|(key, (record, value))| (key, &record.version, value))
     }
 
+    /// All values of a kind whose names begin with `prefix`, by name.
+    pub fn below<'a>(
+        &'a self,
+        kind: RecordKind,
+        prefix: &'a str,
+    ) -> impl Iterator<Item = (&'a FleetKey, &'a Version, &'a FleetValue)> {
+        let from = FleetKey { kind, name: String::from(prefix) };
+        self.records
+            .range(from..)
+            .take_while(move |(key, _)| key.kind == kind && key.name.starts_with(prefix))
+            .map(|(key, (record, value))| (key, &record.version, value))
+    }
+
     /// How many records there are.
     pub fn len(&self) -> usize {
         self.records.len()
@@ -162,66 +193,98 @@ impl FleetTable {
         self.records.is_empty()
     }
 
-    /// One hash per bucket.
-    pub(super) fn digest(&self) -> Vec<u32> {
-        let mut buckets = vec![0; BUCKETS];
-        for (record, _) in self.records.values() {
-            let key = key_hash(&record.key);
-            buckets[bucket_of(key)] ^= fold(u64::from(key) << 32 | u64::from(record.stamp()));
-        }
-        buckets
+    /// Hashes of the table.
+    pub(super) fn tree(&self) -> &FleetTree {
+        &self.tree
     }
 
-    /// All of one bucket in pieces of at most `entries_max` entries, by key hash.
-    pub(super) fn pieces(
-        &self,
-        bucket: usize,
-        answer: bool,
-        entries_max: usize,
-    ) -> Vec<FleetBucket> {
-        let mut entries: Vec<(u32, u32)> =
-            self.in_bucket(bucket).map(|record| (key_hash(&record.key), record.stamp())).collect();
-        entries.sort_unstable();
-        let number = u8::try_from(bucket).expect("buckets are few");
+    /// How many records have a key hash in `low..=high`, counted up to `max`.
+    pub(super) fn count_in(&self, low: u32, high: u32, max: usize) -> usize {
+        self.in_range(low, high).take(max).count()
+    }
+
+    /// All of a node in pieces of at most `entries_max` entries, by key hash.
+    pub(super) fn pieces(&self, depth: u8, prefix: u16, entries_max: usize) -> Vec<FleetEntries> {
+        let (mut low, high) = range_of(depth, prefix);
+        let mut entries: Vec<(u32, u32)> = self
+            .in_range(low, high)
+            .map(|record| (key_hash(&record.key), record.stamp()))
+            .collect();
         let mut pieces = Vec::new();
-        let mut low = 0;
         while entries.len() > entries_max {
             let rest = entries.split_off(entries_max);
-            let high = rest[0].0.saturating_sub(1);
-            pieces.push(FleetBucket { bucket: number, answer, low, high, entries });
-            low = rest[0].0;
+            let next = rest[0].0;
+            pieces.push(FleetEntries { low, high: next.saturating_sub(1), entries });
+            low = next;
             entries = rest;
         }
-        pieces.push(FleetBucket { bucket: number, answer, low, high: u32::MAX, entries });
+        pieces.push(FleetEntries { low, high, entries });
         pieces
     }
 
-    /// Records that a sender of `piece` lacks or holds differently.
-    pub(super) fn missing_from(&self, piece: &FleetBucket) -> Vec<FleetRecord> {
-        self.in_bucket(usize::from(piece.bucket))
-            .filter(|record| {
-                let key = key_hash(&record.key);
-                (piece.low..=piece.high).contains(&key)
-                    && piece.entries.binary_search(&(key, record.stamp())).is_err()
-            })
-            .cloned()
-            .collect()
+    /// Records that a sender of `piece` lacks or holds differently, at most `max`.
+    pub(super) fn missing_from(&self, piece: &FleetEntries, max: usize) -> Vec<FleetRecord> {
+        let lacking = self.in_range(piece.low, piece.high).filter(|record| {
+            piece.entries.binary_search(&(key_hash(&record.key), record.stamp())).is_err()
+        });
+        lacking.take(max).cloned().collect()
     }
 
-    /// Whether the sender of `piece` holds something that this table lacks or holds differently.
-    pub(super) fn lacks_of(&self, piece: &FleetBucket) -> bool {
-        let held: Vec<(u32, u32)> = self
-            .in_bucket(usize::from(piece.bucket))
-            .map(|record| (key_hash(&record.key), record.stamp()))
+    /// Key hashes of what the sender of `piece` holds and this table lacks or holds
+    /// differently.
+    pub(super) fn wanted_of(&self, piece: &FleetEntries) -> Vec<u32> {
+        let held = self.in_range(piece.low, piece.high);
+        let held: BTreeSet<(u32, u32)> =
+            held.map(|record| (key_hash(&record.key), record.stamp())).collect();
+        let lacking = piece.entries.iter().filter(|entry| !held.contains(entry));
+        lacking.map(|(key, _)| *key).collect()
+    }
+
+    /// Records by key hash.
+    pub(super) fn by_hash(&self, key_hash: u32) -> impl Iterator<Item = &FleetRecord> {
+        self.in_range(key_hash, key_hash)
+    }
+
+    fn in_range(&self, low: u32, high: u32) -> impl Iterator<Item = &FleetRecord> {
+        let from = (low, FleetKey { kind: RecordKind(0), name: String::new() });
+        let ordered = (low <= high).then(|| self.hashes.range(from..));
+        ordered
+            .into_iter()
+            .flatten()
+            .take_while(move |(hash, _)| *hash <= high)
+            .map(|(_, key)| &self.records[key].0)
+    }
+
+    fn put(&mut self, record: FleetRecord, value: FleetValue) {
+        let hash = key_hash(&record.key);
+        self.tree.toggle(hash, record.stamp());
+        let key = record.key.clone();
+        match self.records.insert(key.clone(), (record, value)) {
+            Some((before, _)) => self.tree.toggle(hash, before.stamp()),
+            None => {
+                self.hashes.insert((hash, key));
+            }
+        }
+    }
+
+    /// What no table may do: see [`Defect::TombstoneDropped`].
+    fn drop_tombstones(&mut self) {
+        let is_dead = |value: &FleetValue| matches!(value, FleetValue::System(s) if !s.wanted);
+        let dead: Vec<FleetKey> = self
+            .records
+            .iter()
+            .filter(|(_, (_, value))| is_dead(value))
+            .map(|(key, _)| key.clone())
             .collect();
-        piece.entries.iter().any(|entry| !held.contains(entry))
+        dead.iter().for_each(|key| self.drop_record(key));
     }
 
-    fn in_bucket(&self, bucket: usize) -> impl Iterator<Item = &FleetRecord> {
-        self.records
-            .values()
-            .map(|(record, _)| record)
-            .filter(move |record| bucket_of(key_hash(&record.key)) == bucket)
+    fn drop_record(&mut self, key: &FleetKey) {
+        if let Some((record, _)) = self.records.remove(key) {
+            let hash = key_hash(key);
+            self.tree.toggle(hash, record.stamp());
+            self.hashes.remove(&(hash, key.clone()));
+        }
     }
 
     /// Whether a greater revision of its system is known.
@@ -232,9 +295,27 @@ impl FleetTable {
     }
 
     fn drop_parts_before(&mut self, system: &str, revision: u64) {
-        self.records.retain(|key, (record, _)| {
-            system_of_part(key) != Some(system) || record.version.revision >= revision
-        });
+        let kinds = [
+            RecordKind::COMPONENT,
+            RecordKind::CONNECTION,
+            RecordKind::ALLOCATION,
+            RecordKind::RECOVERY,
+        ];
+        let mut outdated = Vec::new();
+        for kind in kinds {
+            let from = FleetKey { kind, name: String::from(system) };
+            let parts = self
+                .records
+                .range(from..)
+                .take_while(|(key, _)| key.kind == kind && key.name.starts_with(system));
+            let old = parts.filter(|(key, (record, _))| {
+                system_of_part(key) == Some(system) && record.version.revision < revision
+            });
+            outdated.extend(old.map(|(key, _)| key.clone()));
+        }
+        for key in outdated {
+            self.drop_record(&key);
+        }
     }
 }
 
@@ -250,12 +331,9 @@ fn system_of_part(key: &FleetKey) -> Option<&str> {
     part.then(|| key.name.split('/').next().unwrap_or(&key.name))
 }
 
+/// Where a key stands in the tree.
 fn key_hash(key: &FleetKey) -> u32 {
     fold(hash64(key.name.as_bytes()) ^ (u64::from(key.kind.0) << 56))
-}
-
-fn bucket_of(key_hash: u32) -> usize {
-    usize::try_from(key_hash).unwrap_or(0) % BUCKETS
 }
 
 /// Folds 64 bits to 32 after mixing, so that similar inputs part.

@@ -1,109 +1,180 @@
-//! Round trips of every pair that talks: RTT, jitter, loss.
+//! Round trips, jitter and loss of every pair that talks, from numbers that ride on
+//! whatever is sent anyway.
 
 use alloc::{
     collections::{BTreeMap, VecDeque},
     vec::Vec,
 };
-use core::{net::SocketAddr, time::Duration};
+use core::time::Duration;
 
-use crate::{id::RobotId, report::LinkReport, time::Instant, units::Permille};
+use super::{
+    author_table::Seat,
+    wire::{Echo, LinkMark},
+};
+use crate::{report::LinkReport, time::Instant, units::Permille};
 
 /// Round trips kept for the median.
 const SAMPLES: usize = 16;
-/// Outcomes kept for the loss.
-const OUTCOMES: usize = 64;
-/// A ping without an answer for so long is lost.
-const LOST_AFTER: Duration = Duration::from_secs(1);
-/// Pings under way at once; the oldest is given up beyond it.
-const PENDING_MAX: usize = 256;
+/// Datagrams that the loss is taken over.
+const WINDOW: u16 = 64;
+/// Sent datagrams whose moment is remembered.
+const SENT_MAX: usize = 32;
+/// A datagram that nobody echoed for so long is lost, when later ones are missing too.
+const LOST_AFTER: Duration = Duration::from_secs(2);
+/// Datagrams without any echo that make the way out a dead one.
+const UNECHOED_MAX: usize = 4;
 
 #[derive(Clone, Debug, Default)]
 struct Link {
     round_trips: VecDeque<Duration>,
     jitter: Duration,
-    answered: VecDeque<bool>,
+    /// The number of the last datagram sent, and when the last ones were.
+    number: u16,
+    sent: VecDeque<(u16, Instant)>,
+    /// The last number that came, when, and which of the 64 up to it did.
+    came: Option<(u16, Instant)>,
+    came_bits: u64,
+    came_count: u16,
+    /// What the other end says of the way out.
+    loss_out: Option<u8>,
+    echoed: Option<(u16, Instant)>,
 }
 
-/// Links of this robot.
+/// Links of this robot, by the other robot's seat.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Links {
-    links: BTreeMap<RobotId, Link>,
-    robots: BTreeMap<SocketAddr, RobotId>,
-    pending: BTreeMap<u16, (SocketAddr, Instant)>,
-    number: u16,
+    links: BTreeMap<Seat, Link>,
 }
 
 impl Links {
-    /// The number for a ping to `to`, sent now.
-    pub(super) fn ping(&mut self, to: SocketAddr, now: Instant) -> u16 {
-        self.give_up(now);
-        self.number = self.number.wrapping_add(1);
-        self.pending.insert(self.number, (to, now));
-        self.number
-    }
-
-    /// An answer of `robot` to ping `number`; false for one that is not awaited.
-    pub(super) fn pong(&mut self, robot: &RobotId, number: u16, now: Instant) -> bool {
-        let Some((to, sent_at)) = self.pending.remove(&number) else { return false };
-        self.robots.insert(to, robot.clone());
-        let link = self.links.entry(robot.clone()).or_default();
-        let round_trip = now.since(sent_at);
-        if let Some(before) = link.round_trips.back() {
-            // RFC 3550, 6.4.1: J += (|D| - J) / 16
-            let change = round_trip.abs_diff(*before);
-            link.jitter = link.jitter - link.jitter / 16 + change / 16;
+    /// Numbers a datagram to `to`, sent now.
+    pub(super) fn mark(&mut self, to: Seat, now: Instant) -> LinkMark {
+        let link = self.links.entry(to).or_default();
+        link.number = link.number.wrapping_add(1);
+        if link.sent.len() >= SENT_MAX {
+            link.sent.pop_front();
         }
-        push(&mut link.round_trips, round_trip, SAMPLES);
-        push(&mut link.answered, true, OUTCOMES);
-        true
+        link.sent.push_back((link.number, now));
+        let echo = link.came.map(|(number, at)| Echo {
+            number,
+            held: u32::try_from(now.since(at).as_micros() / 100).unwrap_or(u32::MAX),
+            loss: u8::try_from(u32::from(link.lost_in()) * 255 / 1000).unwrap_or(255),
+        });
+        LinkMark { number: link.number, echo }
     }
 
-    /// This robot was deaf: what is under way proves nothing.
+    /// The mark of a datagram that came from `from`.
+    pub(super) fn take(&mut self, from: Seat, mark: LinkMark, now: Instant) {
+        let link = self.links.entry(from).or_default();
+        link.take_number(mark.number, now);
+        if let Some(echo) = mark.echo {
+            link.take_echo(echo, now);
+        }
+    }
+
+    /// This robot was paused or deaf: what is under way proves nothing.
     pub(super) fn forgive(&mut self) {
-        self.pending.clear();
+        for link in self.links.values_mut() {
+            link.sent.clear();
+        }
     }
 
-    pub(super) fn reports(&self) -> impl Iterator<Item = (&RobotId, LinkReport)> {
-        self.links.iter().map(|(robot, link)| (robot, link.report()))
+    /// The robot starts its numbers anew.
+    pub(super) fn reset(&mut self, seat: Seat) {
+        self.links.remove(&seat);
     }
 
-    fn give_up(&mut self, now: Instant) {
-        let lost: Vec<u16> = self
-            .pending
-            .iter()
-            .filter(|(_, (_, sent_at))| now.since(*sent_at) >= LOST_AFTER)
-            .map(|(number, _)| *number)
-            .collect();
-        for number in lost {
-            let Some((to, _)) = self.pending.remove(&number) else { continue };
-            let Some(robot) = self.robots.get(&to) else { continue };
-            if let Some(link) = self.links.get_mut(robot) {
-                push(&mut link.answered, false, OUTCOMES);
-            }
-        }
-        while self.pending.len() >= PENDING_MAX {
-            self.pending.pop_first();
-        }
+    /// What was measured so far; a robot that lives and was not heard directly since
+    /// `silent_before` has a way in that loses everything.
+    pub(super) fn reports(
+        &self,
+        now: Instant,
+        silent_before: Instant,
+    ) -> impl Iterator<Item = (Seat, LinkReport)> {
+        let known = self.links.iter().filter(|(_, link)| link.came.is_some());
+        known.map(move |(seat, link)| (*seat, link.report(now, silent_before)))
     }
 }
 
 impl Link {
-    fn report(&self) -> LinkReport {
+    fn take_number(&mut self, number: u16, now: Instant) {
+        let ahead = self.came.map_or(1, |(last, _)| number.wrapping_sub(last));
+        let behind = ahead.wrapping_neg();
+        if ahead != 0 && ahead < u16::MAX / 2 {
+            let shifted = u32::from(ahead);
+            self.came_bits = self.came_bits.checked_shl(shifted).unwrap_or(0) | 1;
+            self.came_count = self.came_count.saturating_add(ahead).min(WINDOW);
+            self.came = Some((number, now));
+        } else if behind < WINDOW {
+            self.came_bits |= 1 << behind;
+        }
+    }
+
+    fn take_echo(&mut self, echo: Echo, now: Instant) {
+        let older = self.echoed.is_some_and(|(last, _)| {
+            let ahead = echo.number.wrapping_sub(last);
+            ahead == 0 || ahead > u16::MAX / 2
+        });
+        self.loss_out = Some(echo.loss);
+        if older {
+            return;
+        }
+        self.echoed = Some((echo.number, now));
+        let Some((_, sent_at)) = self.sent.iter().find(|(number, _)| *number == echo.number) else {
+            return;
+        };
+        let held = Duration::from_micros(u64::from(echo.held) * 100);
+        let Some(round_trip) = now.since(*sent_at).checked_sub(held) else { return };
+        if let Some(before) = self.round_trips.back() {
+            // RFC 3550, 6.4.1: J += (|D| - J) / 16
+            let change = round_trip.abs_diff(*before);
+            self.jitter = self.jitter - self.jitter / 16 + change / 16;
+        }
+        if self.round_trips.len() >= SAMPLES {
+            self.round_trips.pop_front();
+        }
+        self.round_trips.push_back(round_trip);
+    }
+
+    /// Lost datagrams of the last ones that should have come, thousandths.
+    fn lost_in(&self) -> u16 {
+        let window = self.came_count.max(1);
+        let mask = if window >= WINDOW { u64::MAX } else { (1 << window) - 1 };
+        let came = u16::try_from((self.came_bits & mask).count_ones()).unwrap_or(WINDOW);
+        window.saturating_sub(came) * 1000 / window
+    }
+
+    /// Lost datagrams of the last ones sent, thousandths: what the other end counts, and
+    /// all that were sent since it echoed one.
+    fn lost_out(&self, now: Instant) -> u32 {
+        let since = self.echoed.map_or(0, |(number, _)| number);
+        let unanswered = self.sent.iter().filter(|(number, at)| {
+            let ahead = number.wrapping_sub(since);
+            ahead != 0 && ahead < u16::MAX / 2 && now.since(*at) > LOST_AFTER
+        });
+        let unanswered = unanswered.count();
+        let silent = self.echoed.is_none_or(|(_, at)| {
+            self.came.is_some_and(|(_, came_at)| came_at.since(at) > LOST_AFTER)
+        });
+        if silent && unanswered >= UNECHOED_MAX {
+            return 1000;
+        }
+        self.loss_out.map_or(0, |loss| u32::from(loss) * 1000 / 255)
+    }
+
+    fn report(&self, now: Instant, silent_before: Instant) -> LinkReport {
         let mut sorted: Vec<Duration> = self.round_trips.iter().copied().collect();
         sorted.sort_unstable();
-        let lost = self.answered.iter().filter(|answered| !**answered).count();
-        let permille = lost * 1000 / self.answered.len().max(1);
+        let silent = self.came.is_some_and(|(_, at)| at < silent_before);
+        let loss_in = if silent { 1000 } else { u32::from(self.lost_in()) };
+        let loss_out = self.lost_out(now);
+        let both = 1000 - (1000 - loss_in) * (1000 - loss_out) / 1000;
         LinkReport {
             rtt: sorted.get(sorted.len() / 2).copied().unwrap_or_default(),
             jitter: self.jitter,
-            loss: Permille(u32::try_from(permille).unwrap_or(1000)),
+            loss: Permille(both),
+            loss_out: Permille(loss_out),
+            loss_in: Permille(loss_in),
         }
     }
-}
-
-fn push<T>(queue: &mut VecDeque<T>, value: T, max: usize) {
-    if queue.len() >= max {
-        queue.pop_front();
-    }
-    queue.push_back(value);
 }

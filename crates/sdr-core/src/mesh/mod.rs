@@ -1,16 +1,36 @@
-//! The gossip mesh: two replicated tables, spread in datagrams of at most 1200 bytes.
+//! The gossip mesh: two replicated tables and everybody's signs of life, in datagrams of at
+//! most 1200 bytes.
 //!
-//! Every gossip period a robot greets a few others with its digests; each answer brings
-//! what the asker lacks, and asks for what the answerer lacks (Scuttlebutt, van Renesse et
-//! al. 2008, for reports; hashed buckets for the fleet table). What concerns others at
-//! once is pushed without waiting for the next round.
+//! ```text
+//!            handle_datagram            handle_tick
+//!                  │                         │
+//!   receive ───────┤                         ├─────── round: one datagram to one robot
+//!                  ▼                         ▼
+//!   liveness   who is alive       author_table  what each robot says of itself
+//!   links      how pairs hear     fleet_table   what the fleet agrees on
+//!                  │                         │
+//!                  └───▶ news, outbox ◀──────┴── spread: news at once, with repeats
+//!                                                repair: what differs, on difference only
+//! ```
+//!
+//! Each round a robot tells one other whom it heard lately (beats of five bytes) and a hash of
+//! what it holds; more is said only where hashes or sequences differ. `docs/mesh.md` has the
+//! bytes and the guarantees.
 
+mod author;
 mod author_table;
-mod exchange;
 mod fleet_table;
+mod fleet_tree;
+mod inquiry;
 mod links;
 mod liveness;
+mod news;
+mod outbox;
 mod peers;
+mod receive;
+mod repair;
+mod round;
+mod spread;
 #[cfg(test)]
 mod tests;
 mod wire;
@@ -18,103 +38,66 @@ mod wire;
 use alloc::{collections::VecDeque, vec::Vec};
 use core::{net::SocketAddr, time::Duration};
 
-pub use author_table::{Author, AuthorKey, AuthorTable, Incarnation};
+pub use author::{Author, AuthorKey, Incarnation};
+pub use author_table::AuthorTable;
 pub use fleet_table::{FleetRecord, FleetTable, Merge};
+pub use liveness::Standing;
+pub use news::{Inquiry, MeshConfig, MeshCounters, MeshNews, MeshTraffic, Push};
 pub use wire::{
-    AuthorDelta, AuthorDigest, AuthorStamp, DATAGRAM_BYTES_MAX, Datagram, FleetBucket, Section,
+    AskNews, AskStamps, AuthorDelta, Beat, Beats, DATAGRAM_BYTES_MAX, Datagram, Echo, FleetEntries,
+    FleetNodes, Header, LinkMark, News, RosterPiece, SEAL_BYTES_MAX, Section, Stamp, Summary,
     WireError,
 };
 
 use crate::{
     id::RobotId,
     order::hash64,
-    record::FleetKey,
     report::{LinkReport, Report},
     rng::Rng,
     time::Instant,
 };
+use author_table::{Admission, Seat};
+use inquiry::Inquiries;
 use links::Links;
 use liveness::Liveness;
 use peers::Peers;
+use repair::Repair;
+use round::{Guard, Told};
+use spread::Spread;
 
-/// Robots that a push reaches directly; gossip brings it to the others.
-const PUSH_PEERS_MAX: usize = 8;
-/// Robots greeted in one round of gossip.
-const GOSSIP_PEERS: usize = 2;
-/// Robots a fresh fleet record is forwarded to.
-const FORWARD_PEERS: usize = 3;
-
-/// What is settled at the start.
-#[derive(Clone, Debug)]
-pub struct MeshConfig {
-    /// This robot.
-    pub robot: RobotId,
-    /// Datagrams of other fleets are dropped.
-    pub fleet: u32,
-    /// Addresses to begin with.
-    pub seeds: Vec<SocketAddr>,
-    /// Where this robot listens, when it may tell others.
-    pub listen: Option<SocketAddr>,
-    /// Time between two rounds.
-    pub period: Duration,
-    /// Age of news at which a robot counts as gone.
-    pub gone_after: Duration,
-}
-
-/// What changed by a datagram or by time, for the brain.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum MeshNews {
-    /// A robot said something new of itself.
-    Report(RobotId),
-    /// The fleet table has a greater version of this fact.
-    Record(FleetKey),
-    /// A robot is heard for the first time, or again.
-    Alive(RobotId),
-    /// No fresh news of a robot for too long.
-    Gone(RobotId),
-    /// Somebody else speaks under this robot's name.
-    DuplicateId(SocketAddr),
-}
-
-/// Counters for operators; a broken packet is counted and dropped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MeshCounters {
-    /// Datagrams taken in.
-    pub received: u64,
-    /// Datagrams that were garbage, cut short, too long, or of an unknown version.
-    pub malformed: u64,
-    /// Datagrams of other fleets.
-    pub foreign: u64,
-    /// Datagrams that brought nothing newer than what was known of their sender: repeated,
-    /// late or played back.
-    pub stale: u64,
-    /// Records refused because they could not be read or were too large.
-    pub refused: u64,
-    /// Datagrams sent.
-    pub sent: u64,
-    /// Their bytes.
-    pub sent_bytes: u64,
-}
+/// Beats in one datagram; larger fleets take turns.
+const BEATS_TOLD: usize = 40;
+/// Datagrams in answer to one, so that a small question has no huge answer.
+const ANSWERS_MAX: usize = 12;
 
 /// The mesh of one robot: pure, driven by `handle_*`, drained by `poll_*`.
 #[derive(Debug)]
 pub struct Mesh {
     config: MeshConfig,
     own: Incarnation,
-    heartbeat: u64,
-    /// Own records up to this one were pushed.
-    pushed: u64,
+    born_at: Instant,
+    /// The last moment that the caller gave.
+    clock: Instant,
+    /// Datagrams until then may have waited for this robot's pause.
+    late_until: Instant,
+    late_by: Duration,
     in_step: bool,
     authors: AuthorTable,
     fleet: FleetTable,
     liveness: Liveness,
     links: Links,
     peers: Peers,
+    spread: Spread,
+    repair: Repair,
+    told: Told,
+    guard: Guard,
+    inquiries: Inquiries,
     rng: Rng,
     round_at: Instant,
     outbox: VecDeque<(SocketAddr, Vec<u8>)>,
     news: VecDeque<MeshNews>,
     counters: MeshCounters,
+    traffic: MeshTraffic,
 }
 
 impl Mesh {
@@ -126,71 +109,97 @@ impl Mesh {
         peers: &[SocketAddr],
         now: Instant,
     ) -> Self {
-        let seeds: Vec<SocketAddr> = config.seeds.iter().chain(peers).copied().collect();
+        let mut rng = Rng::new(hash64(config.robot.as_str().as_bytes()) ^ u64::from(own.nonce));
+        let known = config.seeds.iter().chain(peers).copied();
+        let mut liveness = Liveness::new(config.gone_after, config.period, now);
+        liveness.reset(Seat::OWN);
         Self {
-            rng: Rng::new(hash64(config.robot.as_str().as_bytes()) ^ u64::from(own.nonce)),
             authors: AuthorTable::new(config.robot.clone(), own),
-            liveness: Liveness::new(config.gone_after),
+            liveness,
             links: Links::default(),
-            peers: Peers::new(seeds, config.listen),
+            peers: Peers::new(known, config.listen),
+            spread: Spread::default(),
+            repair: Repair::default(),
+            told: Told::default(),
+            guard: Guard::default(),
+            inquiries: Inquiries::default(),
+            round_at: now + config.period * u32::try_from(rng.below(256)).unwrap_or(0) / 1024,
+            rng,
             config,
             own,
-            heartbeat: 0,
-            pushed: 0,
+            born_at: now,
+            clock: now,
+            late_until: now,
+            late_by: Duration::ZERO,
             in_step: false,
             fleet,
-            round_at: now,
             outbox: VecDeque::new(),
             news: VecDeque::new(),
             counters: MeshCounters::default(),
+            traffic: MeshTraffic::default(),
         }
     }
 
     /// Takes a datagram; garbage is counted and dropped.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, bytes: &[u8]) {
+        self.clock = now;
         match Datagram::decode(bytes, self.config.fleet) {
-            Ok(datagram) if datagram.from == self.config.robot => {
-                self.handle_own_name(from, &datagram);
+            Ok(datagram) if datagram.header.from == self.config.robot => {
+                self.handle_own_name(from, &datagram.header);
             }
             Ok(datagram) => {
                 self.counters.received += 1;
-                self.take_in(now, from, datagram);
+                self.take_in(from, datagram);
             }
             Err(WireError::Foreign) => self.counters.foreign += 1,
-            Err(_) => self.counters.malformed += 1,
+            Err(
+                WireError::TooLong(_)
+                | WireError::Short(_)
+                | WireError::Magic
+                | WireError::Version(_)
+                | WireError::Body(_),
+            ) => self.counters.malformed += 1,
         }
     }
 
-    /// Does what is due: a round of gossip, and judgement of who is gone.
+    /// Does what is due: a round, repeats of news, guard beats, and judgement of who is gone.
     pub fn handle_tick(&mut self, now: Instant) {
+        self.clock = now;
         if now >= self.round_at {
-            self.round_at = now + self.config.period;
-            self.heartbeat += 1;
-            self.authors.beat(self.heartbeat);
-            self.greet_some(now);
+            let tenth = self.config.period / 10;
+            let chance = u32::try_from(self.rng.below(201)).unwrap_or(0);
+            self.round_at = now + self.config.period - tenth + tenth * chance / 100;
+            self.hold_round();
         }
-        for robot in self.liveness.judge(now) {
-            self.news.push_back(MeshNews::Gone(robot));
-        }
+        self.spread_due();
+        self.compare_on();
+        self.beat_guards();
+        self.judge();
     }
 
     /// Moves every window forward by a pause of this robot, so that its own deafness does
-    /// not bury the others.
+    /// not bury the others. Call it before the first `handle` after the pause.
     pub fn forgive_pause(&mut self, pause: Duration) {
-        self.liveness.forgive(pause);
+        let now = self.clock + pause;
+        self.liveness.forgive_pause(pause, now);
         self.links.forgive();
+        self.late_by = pause;
+        self.late_until = now + Duration::from_millis(50);
     }
 
     /// Says something of this robot; pushed at once when `push`.
     pub fn report(&mut self, report: &Report, push: Push) {
-        if self.authors.set_own(report) && push == Push::Now {
+        self.authors.stage(report);
+        if push == Push::Now {
+            self.authors.release_one(&AuthorKey::of(report));
             self.push_own();
         }
     }
 
     /// Takes back what was said under `key`.
     pub fn retract(&mut self, key: &AuthorKey) {
-        if self.authors.remove_own(key) {
+        if self.authors.unstage(key) {
+            self.authors.release_one(key);
             self.push_own();
         }
     }
@@ -199,16 +208,32 @@ impl Mesh {
     pub fn publish(&mut self, records: Vec<FleetRecord>) {
         let mut fresh = Vec::new();
         for record in records {
-            if self.fleet.merge(record.clone()) == Merge::News {
-                self.news.push_back(MeshNews::Record(record.key.clone()));
-                fresh.push(record);
+            match self.fleet.merge(record.clone()) {
+                Merge::News => {
+                    self.news.push_back(MeshNews::Record(record.key.clone()));
+                    fresh.push(record);
+                }
+                Merge::Refused => self.counters.refused += 1,
+                Merge::Known | Merge::Older => {}
             }
         }
-        let peers = self.peers.pick(PUSH_PEERS_MAX, &mut self.rng, &[]);
-        self.send_records(&fresh, &peers);
+        self.spread_own(fresh);
     }
 
-    /// The next datagram to send.
+    /// Sends small signs of life to `robots` every `period` from now on, whatever else is
+    /// said; to nobody when `robots` is empty.
+    pub fn beat_to(&mut self, robots: Vec<RobotId>, period: Duration) {
+        self.guard.set(robots, period, self.clock);
+    }
+
+    /// Asks up to four living robots for fresh news of `robot`; what they know becomes part
+    /// of this robot's judgement as it arrives.
+    pub fn ask_about(&mut self, now: Instant, robot: &RobotId) {
+        self.clock = now;
+        self.inquire(robot);
+    }
+
+    /// The next datagram to send, at most [`DATAGRAM_BYTES_MAX`].
     pub fn poll_send(&mut self) -> Option<(SocketAddr, Vec<u8>)> {
         let (to, bytes) = self.outbox.pop_front()?;
         self.counters.sent += 1;
@@ -223,10 +248,10 @@ impl Mesh {
 
     /// When `handle_tick` is due.
     pub fn next_deadline(&self) -> Instant {
-        match self.liveness.next_deadline() {
-            Some(gone_at) => gone_at.min(self.round_at),
-            None => self.round_at,
-        }
+        let others = self.liveness.next_deadline().into_iter();
+        let others = others.chain(self.spread.next_deadline()).chain(self.guard.next_deadline());
+        let others = others.chain(self.repair.next_deadline());
+        others.fold(self.round_at, Instant::min)
     }
 
     /// What robots said of themselves.
@@ -239,9 +264,23 @@ impl Mesh {
         &self.fleet
     }
 
-    /// Whether fresh news of `robot` arrives; always of this robot.
+    /// What is judged of `robot`; this robot itself is alive.
+    pub fn standing(&self, robot: &RobotId) -> Standing {
+        match self.authors.seat(robot) {
+            Some(Seat::OWN) => Standing::Alive,
+            Some(seat) => self.liveness.standing(seat),
+            None => Standing::Unheard,
+        }
+    }
+
+    /// Whether `robot` is alive or quiet; always so of this robot.
     pub fn is_alive(&self, robot: &RobotId) -> bool {
-        *robot == self.config.robot || self.liveness.is_alive(robot)
+        matches!(self.standing(robot), Standing::Alive | Standing::Quiet)
+    }
+
+    /// Whether this robot hears nobody at all, though somebody was alive.
+    pub fn is_isolated(&self) -> bool {
+        self.liveness.is_isolated()
     }
 
     /// Whether some other robot held the very same fleet table at least once since the start:
@@ -250,22 +289,45 @@ impl Mesh {
         self.in_step
     }
 
-    /// Age of the last fresh news of `robot`.
+    /// How long ago `robot` said the last that is known of it, by any path.
     pub fn age(&self, robot: &RobotId, now: Instant) -> Option<Duration> {
-        match *robot == self.config.robot {
-            true => Some(Duration::ZERO),
-            false => self.liveness.age(robot, now),
+        match self.authors.seat(robot)? {
+            Seat::OWN => Some(Duration::ZERO),
+            seat => {
+                let seen = self.liveness.get(seat)?;
+                (seen.standing != Standing::Unheard).then(|| now.since(seen.fresh_at))
+            }
         }
     }
 
-    /// Other robots that are alive.
+    /// How many other robots were heard without a relay in the last `within`.
+    pub fn heard_directly(&self, now: Instant, within: Duration) -> usize {
+        let recent = |at: Instant| now.since(at) <= within;
+        self.liveness.all().filter(|(_, seen)| seen.direct_at.is_some_and(recent)).count()
+    }
+
+    /// What came of the last [`Mesh::ask_about`] this robot, for ten seconds.
+    pub fn inquiry(&self, robot: &RobotId) -> Option<Inquiry> {
+        self.inquiries.get(robot)
+    }
+
+    /// The ages at which a robot is quiet and gone at present: as configured, or longer in a
+    /// fleet where news usually takes longer.
+    pub fn patience(&self) -> (Duration, Duration) {
+        (self.liveness.quiet(), self.liveness.gone())
+    }
+
+    /// Other robots that are alive or quiet.
     pub fn alive(&self) -> impl Iterator<Item = &RobotId> {
-        self.liveness.alive()
+        self.liveness.living().map(|(seat, _)| &self.authors.at(seat).robot)
     }
 
     /// Links of this robot, measured by it.
     pub fn links(&self) -> impl Iterator<Item = (&RobotId, LinkReport)> {
-        self.links.reports()
+        let cycle = self.config.period * u32::try_from(self.authors.count()).unwrap_or(u32::MAX);
+        let silent_before = self.clock - (cycle * 6).max(self.config.gone_after / 2);
+        let reports = self.links.reports(self.clock, silent_before);
+        reports.map(|(seat, report)| (&self.authors.at(seat).robot, report))
     }
 
     /// Addresses heard so far.
@@ -278,17 +340,33 @@ impl Mesh {
         self.counters
     }
 
+    /// What was sent for what since the start.
+    pub fn traffic(&self) -> MeshTraffic {
+        self.traffic
+    }
+
     /// The incarnation this robot speaks under.
     pub fn incarnation(&self) -> Incarnation {
         self.own
     }
-}
 
-/// Whether a report may wait for the next round of gossip.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Push {
-    /// Others act on it: send it now.
-    Now,
-    /// The next round is early enough.
-    WithGossip,
+    /// Seats of the living, in order.
+    fn living_seats(&self) -> Vec<Seat> {
+        self.liveness.living().map(|(seat, _)| seat).collect()
+    }
+
+    /// Gives the robot a seat under this incarnation.
+    fn admit(&mut self, robot: &RobotId, incarnation: Incarnation) -> Admission {
+        let admission = self.authors.admit(robot, incarnation);
+        match admission {
+            Admission::New(seat) => {
+                self.liveness.reset(seat);
+                self.links.reset(seat);
+                self.told.introduce(seat);
+            }
+            Admission::Full => self.counters.refused += 1,
+            Admission::Known(_) | Admission::Outdated(_) => {}
+        }
+        admission
+    }
 }

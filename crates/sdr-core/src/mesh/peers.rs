@@ -3,84 +3,141 @@
 use alloc::{collections::BTreeMap, vec::Vec};
 use core::net::SocketAddr;
 
-use crate::{id::RobotId, rng::Rng};
+use super::author_table::Seat;
+use crate::{rng::Rng, time::Instant};
 
 /// Most addresses kept.
-const ADDRESSES_MAX: usize = 2000;
+const ADDRESSES_MAX: usize = 4000;
+
+/// An address that nobody alive was heard from.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stray {
+    tried_at: Option<Instant>,
+}
 
 /// Addresses, and who was heard from them.
 #[derive(Clone, Debug)]
 pub(super) struct Peers {
     own: Option<SocketAddr>,
-    addresses: BTreeMap<SocketAddr, Option<RobotId>>,
+    /// Where the robot of each seat was heard last.
+    heard: Vec<Option<SocketAddr>>,
+    seats: BTreeMap<SocketAddr, Seat>,
+    /// Where nobody was heard yet, or a robot that is gone.
+    strays: BTreeMap<SocketAddr, Stray>,
+    /// Seats whose turn has not come in this shuffle.
+    turn: Vec<Seat>,
+    stride: usize,
 }
 
 impl Peers {
-    pub(super) fn new(known: Vec<SocketAddr>, own: Option<SocketAddr>) -> Self {
-        let mut peers = Self { own, addresses: BTreeMap::new() };
-        for address in known {
-            peers.learn(address);
-        }
+    pub(super) fn new(known: impl Iterator<Item = SocketAddr>, own: Option<SocketAddr>) -> Self {
+        let mut peers = Self {
+            own,
+            heard: Vec::new(),
+            seats: BTreeMap::new(),
+            strays: BTreeMap::new(),
+            turn: Vec::new(),
+            stride: 0,
+        };
+        known.for_each(|address| peers.learn(address));
         peers
     }
 
-    /// `robot` spoke from `address`; another address it used before is forgotten.
-    pub(super) fn hear(&mut self, robot: &RobotId, address: SocketAddr) {
-        if self.addresses.get(&address).is_some_and(|known| known.as_ref() == Some(robot)) {
+    /// The robot of `seat` spoke from `address`; another address it used is forgotten.
+    pub(super) fn hear(&mut self, seat: Seat, address: SocketAddr) {
+        if self.address(seat) == Some(address) && self.seats.get(&address) == Some(&seat) {
             return;
         }
-        self.addresses.retain(|_, known| known.as_ref() != Some(robot));
-        if self.addresses.len() < ADDRESSES_MAX {
-            self.addresses.insert(address, Some(robot.clone()));
+        if self.heard.len() <= seat.index() {
+            self.heard.resize(seat.index() + 1, None);
         }
+        if let Some(before) = self.heard[seat.index()].replace(address) {
+            self.seats.remove(&before);
+        }
+        if let Some(other) = self.seats.insert(address, seat).filter(|other| *other != seat) {
+            self.heard[other.index()] = None;
+        }
+        self.strays.remove(&address);
     }
 
     /// Somebody says that a robot can be reached at `address`.
     pub(super) fn learn(&mut self, address: SocketAddr) {
         let usable = !address.ip().is_unspecified() && address.port() != 0;
-        if usable && Some(address) != self.own && self.addresses.len() < ADDRESSES_MAX {
-            self.addresses.entry(address).or_insert(None);
+        let room = self.seats.len() + self.strays.len() < ADDRESSES_MAX;
+        if usable && room && Some(address) != self.own && !self.seats.contains_key(&address) {
+            self.strays.entry(address).or_default();
         }
     }
 
-    /// At most `count` addresses by chance, those that were heard before the others.
-    pub(super) fn pick(
-        &self,
-        count: usize,
-        rng: &mut Rng,
-        without: &[SocketAddr],
-    ) -> Vec<SocketAddr> {
-        let allowed = |address: &&SocketAddr| !without.contains(address);
-        let by = |heard: bool| {
-            let of = self.addresses.iter().filter(move |(_, robot)| robot.is_some() == heard);
-            of.map(|(address, _)| address).filter(allowed).copied().collect::<Vec<_>>()
-        };
-        let (mut heard, mut unheard) = (by(true), by(false));
-        let mut picked = Vec::new();
-        while picked.len() < count {
-            let from = if heard.is_empty() { &mut unheard } else { &mut heard };
-            if from.is_empty() {
-                break;
+    /// The robot of `seat` is gone: its address is tried now and then.
+    pub(super) fn lose(&mut self, seat: Seat, now: Instant) {
+        let address = self.address(seat);
+        if let Some(address) = address {
+            self.strays.insert(address, Stray { tried_at: Some(now) });
+        }
+    }
+
+    pub(super) fn address(&self, seat: Seat) -> Option<SocketAddr> {
+        self.heard.get(seat.index()).copied().flatten()
+    }
+
+    pub(super) fn seat_at(&self, address: SocketAddr) -> Option<Seat> {
+        self.seats.get(&address).copied()
+    }
+
+    /// The next of `living`, each once in a shuffled turn.
+    pub(super) fn next_in_turn(&mut self, living: &[Seat], rng: &mut Rng) -> Option<Seat> {
+        loop {
+            while let Some(seat) = self.turn.pop() {
+                if self.address(seat).is_some() && living.binary_search(&seat).is_ok() {
+                    return Some(seat);
+                }
             }
-            picked.push(from.swap_remove(rng.below(from.len())));
+            let reachable = living.iter().filter(|seat| self.address(**seat).is_some());
+            self.turn = reachable.copied().collect();
+            if self.turn.is_empty() {
+                return None;
+            }
+            for index in (1..self.turn.len()).rev() {
+                self.turn.swap(index, rng.below(index + 1));
+            }
+        }
+    }
+
+    /// The robot a doubling stride further in `ring`, a sequence that all robots order alike,
+    /// where this robot stands at `own`; `None` when a random one is due.
+    pub(super) fn next_by_stride(&mut self, ring: &[Seat], own: usize) -> Option<Seat> {
+        let strides = ring.len().next_power_of_two().trailing_zeros();
+        let turn = self.stride % (usize::try_from(strides).unwrap_or(0) + 1);
+        self.stride = self.stride.wrapping_add(1);
+        let stride = 1usize.checked_shl(u32::try_from(turn).unwrap_or(0))?;
+        let seat = (stride < ring.len()).then(|| ring[(own + stride) % ring.len()])?;
+        self.address(seat).map(|_| seat)
+    }
+
+    /// At most `count` of `seats` with an address, by chance.
+    pub(super) fn pick(&self, seats: &[Seat], count: usize, rng: &mut Rng) -> Vec<SocketAddr> {
+        let mut left: Vec<SocketAddr> =
+            seats.iter().filter_map(|seat| self.address(*seat)).collect();
+        let mut picked = Vec::new();
+        while picked.len() < count && !left.is_empty() {
+            picked.push(left.swap_remove(rng.below(left.len())));
         }
         picked
     }
 
-    /// One address that was never heard, by chance.
-    pub(super) fn pick_unheard(&self, rng: &mut Rng) -> Option<SocketAddr> {
-        let unheard: Vec<SocketAddr> = self
-            .addresses
-            .iter()
-            .filter(|(_, robot)| robot.is_none())
-            .map(|(address, _)| *address)
-            .collect();
-        unheard.get(rng.below(unheard.len())).copied()
+    /// A stray address that was never tried, or else, if `again`, the one tried longest ago.
+    pub(super) fn next_stray(&mut self, now: Instant, again: bool) -> Option<SocketAddr> {
+        let (address, stray) = self.strays.iter_mut().min_by_key(|(_, stray)| stray.tried_at)?;
+        if stray.tried_at.is_some() && !again {
+            return None;
+        }
+        stray.tried_at = Some(now);
+        Some(*address)
     }
 
-    /// Addresses that were heard, for the disk and for others.
+    /// Addresses that robots were heard from, for the disk and for others.
     pub(super) fn addresses(&self) -> Vec<SocketAddr> {
-        let heard = self.addresses.iter().filter(|(_, robot)| robot.is_some());
-        heard.map(|(address, _)| *address).collect()
+        self.seats.keys().copied().collect()
     }
 }

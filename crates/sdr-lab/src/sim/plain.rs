@@ -148,14 +148,17 @@ impl Plain {
 
 /// Nothing happens; what is sent is counted.
 fn idle_bytes(run: &mut Run, time: Duration) {
-    let before = run.fleet.tally.clone();
+    let guards = |fleet: &Fleet| -> Vec<u64> {
+        fleet.robots.iter().map(super::Robot::guard_bytes).collect()
+    };
+    let before = (run.fleet.tally.sent_bytes.clone(), guards(&run.fleet));
     run.advance(time);
     let seconds = time.as_secs_f64().max(0.001);
-    let after = &run.fleet.tally;
+    let after = (run.fleet.tally.sent_bytes.clone(), guards(&run.fleet));
     for robot in 0..run.fleet.robots.len() {
-        let guard = after.guard_bytes[robot] - before.guard_bytes[robot];
-        let all = after.sent_bytes[robot] - before.sent_bytes[robot];
-        run.measure.record.bytes_per_robot_s.push((all - guard) as f64 / seconds);
+        let guard = after.1[robot].saturating_sub(before.1[robot]);
+        let all = after.0[robot] - before.0[robot];
+        run.measure.record.bytes_per_robot_s.push(all.saturating_sub(guard) as f64 / seconds);
         run.measure.record.guard_bytes_per_robot_s.push(guard as f64 / seconds);
     }
 }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use sdr_core::{
+    api::Accepted,
     effect::{Command, Effect, LaunchOrder, Route},
     input::{Input, InstanceId, InstanceNews},
     lifecycle::LifecycleState,
@@ -46,10 +47,16 @@ impl Fleet {
                     self.later(number, SOON, Input::Planned { plan, result });
                 }
                 Effect::Answer { result, .. } => {
+                    let answer = match result {
+                        Ok(Accepted::System(answer)) => Ok(answer),
+                        // of the role: no system is promised by it
+                        Ok(Accepted::Role(_)) => continue,
+                        Err(error) => Err(error),
+                    };
                     if self.setup.keeps_events {
-                        self.answers.push((number, result.clone()));
+                        self.answers.push((number, answer.clone()));
                     }
-                    self.sights.push(Sight::Answered { robot: number, answer: result });
+                    self.sights.push(Sight::Answered { robot: number, answer });
                 }
                 Effect::Event(event) => {
                     self.trace.note(self.now, number, event.kind.as_bytes());

@@ -5,8 +5,6 @@
 pub struct Tally {
     /// Bytes each robot sent, headers and seal included.
     pub sent_bytes: Vec<u64>,
-    /// Of these, beats of the fast guard.
-    pub guard_bytes: Vec<u64>,
     /// Bytes each robot received, headers and seal included.
     pub received_bytes: Vec<u64>,
     /// Datagrams sent.
@@ -21,12 +19,7 @@ pub struct Tally {
 
 impl Tally {
     pub(crate) fn new(robots: usize) -> Self {
-        Self {
-            sent_bytes: vec![0; robots],
-            guard_bytes: vec![0; robots],
-            received_bytes: vec![0; robots],
-            ..Self::default()
-        }
+        Self { sent_bytes: vec![0; robots], received_bytes: vec![0; robots], ..Self::default() }
     }
 
     pub(crate) fn sent(&mut self, robot: usize, bytes: usize) {

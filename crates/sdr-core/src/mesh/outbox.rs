@@ -1,0 +1,46 @@
+//! Datagrams on their way out.
+
+use alloc::vec::Vec;
+use core::net::SocketAddr;
+
+use super::{ANSWERS_MAX, Header, Mesh, Section, author_table::Seat};
+
+/// Datagrams that wait to be sent; more are dropped.
+const OUTBOX_MAX: usize = 8192;
+
+impl Mesh {
+    /// Milliseconds since this robot's start; from 1.
+    pub(super) fn heartbeat(&self) -> u64 {
+        let age = self.clock.since(self.born_at).as_millis();
+        u64::try_from(age).unwrap_or(u64::MAX).saturating_add(1)
+    }
+
+    fn header(&self) -> Header {
+        Header {
+            fleet: self.config.fleet,
+            from: self.config.robot.clone(),
+            incarnation: self.own,
+            heartbeat: self.heartbeat(),
+            sequence: self.authors.at(Seat::OWN).sequence(),
+        }
+    }
+
+    /// Packs sections into as few datagrams as hold them, numbered when the receiver is known.
+    pub(super) fn send(&mut self, to: SocketAddr, sections: Vec<Section>) -> usize {
+        let mut all = Vec::with_capacity(sections.len() + 1);
+        if let Some(seat) = self.peers.seat_at(to) {
+            all.push(Section::Link(self.links.mark(seat, self.clock)));
+        }
+        all.extend(sections);
+        let mut sent = 0;
+        for bytes in self.header().pack(&all).into_iter().take(ANSWERS_MAX) {
+            if self.outbox.len() >= OUTBOX_MAX {
+                self.traffic.dropped += 1;
+                continue;
+            }
+            sent += bytes.len();
+            self.outbox.push_back((to, bytes));
+        }
+        sent
+    }
+}

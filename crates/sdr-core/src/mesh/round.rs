@@ -1,0 +1,263 @@
+//! What a robot says unasked: one datagram a round, pings, guard beats.
+
+use alloc::{
+    collections::{BTreeMap, BTreeSet},
+    vec,
+    vec::Vec,
+};
+use core::{net::SocketAddr, time::Duration};
+
+use super::{
+    AskStamps, BEATS_TOLD, Beat, Beats, Mesh, Section, Standing, Summary,
+    author_table::{Lookup, Seat},
+    wire::{beat_len, cut},
+};
+use crate::{
+    id::RobotId,
+    record::{FleetValue, RecordKind},
+    time::Instant,
+};
+
+/// Fleets with fewer others greet two of them each round.
+const SMALL_FLEET: usize = 8;
+/// Fleets up to this size spread by doubling strides.
+const STRIDE_FLEET: usize = 64;
+/// Fleets up to this size have ids of two bytes.
+const NARROW_FLEET: usize = 64;
+/// Robots in one datagram by name, when they are new.
+const INTRODUCED_MAX: usize = 3;
+/// How often a new robot is told by name.
+const INTRODUCTIONS: u8 = 3;
+/// New robots that wait to be told; the others are found by comparing.
+const NEWCOMERS_MAX: usize = 64;
+/// Robots without an address that are asked for in one round.
+const ADDRESSES_ASKED_MAX: usize = 4;
+/// Strays are tried again this often, unless nobody is heard.
+const STRAY_PERIOD: Duration = Duration::from_secs(4);
+/// A quiet robot is pinged at most so often.
+const PING_PERIOD: Duration = Duration::from_secs(2);
+/// After hearing nobody for so long, this robot asks several whether it is deaf.
+const LONELY_AFTER: Duration = Duration::from_millis(1500);
+/// Robots asked then, each round.
+const LONELY_PEERS: usize = 3;
+/// Least time between two guard beats.
+const GUARD_PERIOD_MIN: Duration = Duration::from_millis(10);
+
+/// Who is new to others, and when strays were tried.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Told {
+    newcomers: BTreeMap<Seat, u8>,
+    strays_at: Option<Instant>,
+}
+
+impl Told {
+    /// A robot is new, or under a new incarnation: others should hear of it by name.
+    pub(super) fn introduce(&mut self, seat: Seat) {
+        if self.newcomers.len() < NEWCOMERS_MAX {
+            self.newcomers.insert(seat, INTRODUCTIONS);
+        }
+    }
+
+    fn next_newcomers(&mut self) -> Vec<Seat> {
+        let some: Vec<Seat> = self.newcomers.keys().copied().take(INTRODUCED_MAX).collect();
+        for seat in &some {
+            let left = self.newcomers.get(seat).copied().unwrap_or(0);
+            if left > 1 {
+                self.newcomers.insert(*seat, left - 1);
+            } else {
+                self.newcomers.remove(seat);
+            }
+        }
+        some
+    }
+}
+
+/// Robots that get a small sign of life more often.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Guard {
+    robots: Vec<RobotId>,
+    period: Duration,
+    due_at: Option<Instant>,
+}
+
+impl Guard {
+    pub(super) fn set(&mut self, robots: Vec<RobotId>, period: Duration, now: Instant) {
+        let period = period.max(GUARD_PERIOD_MIN);
+        if robots == self.robots && period == self.period {
+            return;
+        }
+        self.due_at = (!robots.is_empty()).then_some(now);
+        self.robots = robots;
+        self.period = period;
+    }
+
+    pub(super) fn next_deadline(&self) -> Option<Instant> {
+        self.due_at
+    }
+}
+
+impl Mesh {
+    /// One round: release what waited, greet one or two, and whoever needs it.
+    pub(super) fn hold_round(&mut self) {
+        self.release_staged();
+        self.repair.tidy(self.clock);
+        self.inquiries.tidy(self.clock);
+        let living = self.living_seats();
+        for seat in self.choose(&living) {
+            self.greet(seat);
+        }
+        self.greet_stray(living.is_empty());
+        self.ping_quiet();
+        if self.liveness.silence(self.clock) > LONELY_AFTER {
+            for peer in self.peers.pick(&living, LONELY_PEERS, &mut self.rng) {
+                self.send(peer, vec![Section::Ping]);
+            }
+        }
+    }
+
+    /// Guard beats that are due; each is the header and the link's mark alone.
+    pub(super) fn beat_guards(&mut self) {
+        if self.guard.due_at.is_none_or(|at| self.clock < at) {
+            return;
+        }
+        self.guard.due_at = Some(self.clock + self.guard.period);
+        let seats = self.guard.robots.iter().filter_map(|robot| self.authors.seat(robot));
+        let addresses: Vec<SocketAddr> =
+            seats.filter_map(|seat| self.peers.address(seat)).collect();
+        for address in addresses {
+            let bytes = self.send(address, Vec::new());
+            self.traffic.guard += 1;
+            self.traffic.guard_bytes += bytes as u64;
+        }
+    }
+
+    /// What every greeting holds: signs of life and hashes.
+    pub(super) fn greeting(&mut self, to: Seat) -> Vec<Section> {
+        let beats = Section::Beats(self.beats_for(to));
+        let summary = Summary { fleet: self.fleet.tree().root(), roster: self.authors.hash() };
+        vec![beats, Section::Summary(summary)]
+    }
+
+    fn greet(&mut self, seat: Seat) {
+        let Some(address) = self.peers.address(seat) else { return };
+        let mut sections = self.greeting(seat);
+        let newcomers = self.told.next_newcomers();
+        sections.extend(self.stamps_for(newcomers.into_iter()));
+        sections.extend(self.ask_addresses());
+        sections.extend(self.next_asks());
+        sections.extend(self.next_deltas());
+        self.send(address, sections);
+    }
+
+    /// Asks where robots are that live and were never heard without a relay.
+    fn ask_addresses(&self) -> Option<Section> {
+        let lacking =
+            self.liveness.living().filter(|(seat, _)| self.peers.address(*seat).is_none());
+        let ids: Vec<u32> =
+            lacking.map(|(seat, _)| self.authors.at(seat).id).take(ADDRESSES_ASKED_MAX).collect();
+        (!ids.is_empty()).then_some(Section::AskStamps(AskStamps { wide: true, ids }))
+    }
+
+    /// Doubling strides in small fleets, where nearly all news passes in every datagram; by
+    /// chance in between and in large ones.
+    fn choose(&mut self, living: &[Seat]) -> Vec<Seat> {
+        let mut chosen = Vec::new();
+        if (SMALL_FLEET..STRIDE_FLEET).contains(&living.len()) {
+            let mut ring: Vec<(u32, Seat)> =
+                living.iter().map(|seat| (self.authors.at(*seat).id, *seat)).collect();
+            ring.push((self.authors.at(Seat::OWN).id, Seat::OWN));
+            ring.sort_unstable();
+            let own = ring.iter().position(|(_, seat)| *seat == Seat::OWN).unwrap_or(0);
+            let ring: Vec<Seat> = ring.into_iter().map(|(_, seat)| seat).collect();
+            chosen.extend(self.peers.next_by_stride(&ring, own));
+        }
+        let wanted = if living.len() < SMALL_FLEET { 2.min(living.len()) } else { 1 };
+        while chosen.len() < wanted {
+            match self.peers.next_in_turn(living, &mut self.rng) {
+                Some(seat) if !chosen.contains(&seat) => chosen.push(seat),
+                Some(_) | None => break,
+            }
+        }
+        chosen
+    }
+
+    /// Signs of life of all others, or of those that are fresh and were told least.
+    fn beats_for(&mut self, to: Seat) -> Beats {
+        let wide = self.authors.count() > NARROW_FLEET;
+        let room = if wide { BEATS_TOLD * beat_len(false) / beat_len(true) } else { BEATS_TOLD };
+        let preferred = self.preferred();
+        let mut ranked: Vec<(u64, Seat)> = Vec::with_capacity(self.liveness.living_count());
+        for (seat, seen) in self.liveness.living() {
+            if seat != to {
+                let age = self.clock.since(seen.fresh_at).as_micros();
+                let told = self.config.period.as_micros() * u128::from(seen.told);
+                let rank = if preferred.contains(&seat) { age / 4 } else { age + told };
+                ranked.push((u64::try_from(rank).unwrap_or(u64::MAX), seat));
+            }
+        }
+        if ranked.len() > room {
+            ranked.select_nth_unstable(room);
+            ranked.truncate(room);
+        }
+        let mut beats = Vec::with_capacity(ranked.len());
+        for (_, seat) in ranked {
+            let author = self.authors.at(seat);
+            let id = cut(author.id, wide);
+            let (sequence, unique) = (author.sequence(), self.authors.lookup(id, wide));
+            let Some(seen) = self.liveness.get_mut(seat) else { continue };
+            seen.told = seen.told.saturating_add(1);
+            let age = self.clock.since(seen.fresh_at);
+            match (unique, Beat::new(id, seen.heartbeat, sequence, age)) {
+                (Lookup::One(_), Some(beat)) => beats.push(beat),
+                (Lookup::Ambiguous, Some(_)) => self.told.introduce(seat),
+                (Lookup::Ambiguous | Lookup::Unknown, _) | (Lookup::One(_), None) => {}
+            }
+        }
+        Beats { wide, beats }
+    }
+
+    /// Robots whose news matters most here: whom this robot guards, and the coordinator.
+    fn preferred(&self) -> BTreeSet<Seat> {
+        let holder = match self.fleet.get(RecordKind::ROLE, "") {
+            Some((_, FleetValue::Role(role))) => self.authors.seat(&role.holder),
+            Some(_) | None => None,
+        };
+        let guarded = self.guard.robots.iter().filter_map(|robot| self.authors.seat(robot));
+        guarded.chain(holder).collect()
+    }
+
+    /// Says hello where nobody is known to live.
+    fn greet_stray(&mut self, alone: bool) {
+        let due = self.told.strays_at.is_none_or(|at| self.clock.since(at) >= STRAY_PERIOD);
+        let again = alone || self.is_isolated() || due;
+        let Some(address) = self.peers.next_stray(self.clock, again) else { return };
+        self.told.strays_at = Some(self.clock);
+        let mut greeting = self.greeting(Seat::OWN);
+        greeting.push(Section::Ping);
+        self.send(address, greeting);
+    }
+
+    /// Asks the robot that has been quiet longest without being asked for a sign of life, and
+    /// others for news of it.
+    fn ping_quiet(&mut self) {
+        let late = self.liveness.quiet() * 5 / 4;
+        let quiet = self.liveness.living().filter(|(_, seen)| {
+            seen.standing == Standing::Quiet
+                && self.clock.since(seen.fresh_at) >= late
+                && self.clock.since(seen.pinged_at) >= PING_PERIOD
+        });
+        let Some((_, seat)) = quiet.map(|(seat, seen)| (seen.pinged_at, seat)).min() else {
+            return;
+        };
+        let Some(seen) = self.liveness.get_mut(seat) else { return };
+        let again = self.clock.since(seen.pinged_at) < PING_PERIOD * 2;
+        seen.pinged_at = self.clock;
+        if let Some(address) = self.peers.address(seat) {
+            self.send(address, vec![Section::Ping]);
+        }
+        if again {
+            let robot = self.authors.at(seat).robot.clone();
+            self.inquire(&robot);
+        }
+    }
+}
