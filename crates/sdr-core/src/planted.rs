@@ -48,13 +48,11 @@ pub enum Defect {
     HomesNotStored,
     /// Samples of the home are not forwarded to other robots.
     SilentRoute,
-    /// A write that failed counts as done.
-    DiskErrorIgnored,
 }
 
 impl Defect {
     /// All of them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 21] = [
         Self::NoEpochCheck,
         Self::WireBeforeDisk,
         Self::TermNotStored,
@@ -76,7 +74,6 @@ impl Defect {
         Self::StaleReports,
         Self::HomesNotStored,
         Self::SilentRoute,
-        Self::DiskErrorIgnored,
     ];
 }
 

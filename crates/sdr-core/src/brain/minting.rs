@@ -163,9 +163,6 @@ impl Brain {
 
     /// Keeps running, mints nothing, says so.
     pub(super) fn handle_store_failed(&mut self, ticket: StoreTicket, reason: &str) {
-        if planted::is(Defect::DiskErrorIgnored) {
-            return self.handle_stored(ticket);
-        }
         self.desk.spoken = true;
         self.desk.broken_at = Some(self.handled_at);
         if self.desk.in_flight == Some(ticket) {

@@ -146,28 +146,19 @@ impl Plain {
     }
 }
 
-/// What each robot sent as guard beats so far, headers and seal included.
-fn guard_bytes(run: &Run) -> Vec<u64> {
-    let traffic = |robot: &super::Robot| robot.brain().map(|brain| brain.mesh_traffic());
-    let bytes = |robot| {
-        let traffic = traffic(robot).unwrap_or_default();
-        traffic.guard_bytes + traffic.guard * FRAME_BYTES as u64
-    };
-    run.fleet.robots.iter().map(bytes).collect()
-}
-
 /// Nothing happens; what is sent is counted.
 fn idle_bytes(run: &mut Run, time: Duration) {
-    let before = run.fleet.tally.clone();
-    let guard_before = guard_bytes(run);
+    let guards = |fleet: &Fleet| -> Vec<u64> {
+        fleet.robots.iter().map(super::Robot::guard_bytes).collect()
+    };
+    let before = (run.fleet.tally.sent_bytes.clone(), guards(&run.fleet));
     run.advance(time);
     let seconds = time.as_secs_f64().max(0.001);
-    let guard_after = guard_bytes(run);
-    let after = &run.fleet.tally;
+    let after = (run.fleet.tally.sent_bytes.clone(), guards(&run.fleet));
     for robot in 0..run.fleet.robots.len() {
-        let guard = guard_after[robot] - guard_before[robot];
-        let all = after.sent_bytes[robot] - before.sent_bytes[robot];
-        run.measure.record.bytes_per_robot_s.push((all - guard) as f64 / seconds);
+        let guard = after.1[robot].saturating_sub(before.1[robot]);
+        let all = after.0[robot] - before.0[robot];
+        run.measure.record.bytes_per_robot_s.push(all.saturating_sub(guard) as f64 / seconds);
         run.measure.record.guard_bytes_per_robot_s.push(guard as f64 / seconds);
     }
 }

@@ -17,7 +17,7 @@ use sdr_core::{
 };
 
 use super::{
-    air::address,
+    air::{FRAME_BYTES, address},
     clock::Clock,
     disk::Disk,
     process::{Behaviour, Process},
@@ -165,6 +165,12 @@ impl Robot {
     /// Most effects of one input so far.
     pub fn effects_max(&self) -> usize {
         self.effects_max
+    }
+
+    /// Bytes of guard beats since its start, headers and seal included.
+    pub fn guard_bytes(&self) -> u64 {
+        let traffic = self.brain.as_ref().map(|brain| brain.mesh().traffic()).unwrap_or_default();
+        traffic.guard_bytes + traffic.guard * FRAME_BYTES as u64
     }
 
     /// Longest datagram so far, bytes.

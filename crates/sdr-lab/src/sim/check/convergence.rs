@@ -134,8 +134,8 @@ fn instances_of(
         | Report::Host(_)
         | Report::Link(..)
         | Report::Condition(_)
-        | Report::Succession(_)
-        | Report::Homeless(_) => None,
+        | Report::Homeless(_)
+        | Report::Succession(_) => None,
     });
     instances.collect()
 }
