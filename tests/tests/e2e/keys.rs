@@ -1,6 +1,11 @@
 //! Keys with real agents: who is let in, who is refused, and a fleet that changes its keys.
 
-use std::{fs, net::UdpSocket, time::Duration};
+use std::{
+    fs,
+    io::{Read, Write},
+    net::{TcpStream, UdpSocket},
+    time::Duration,
+};
 
 use sdr_tests::house::{Agent, House, exploration, wait_for};
 
@@ -57,6 +62,13 @@ fn operators_do_what_their_role_allows_and_others_are_refused_with_a_reason() {
     let (fine, said) = remote(&house, "ben", &["status"]);
     assert!(!fine && said.contains("it refused operate/ben: revoked"), "{said}");
     assert!(told(&house.agents[0]).contains("api: operate/ben was revoked"), "{}", house.story());
+
+    let mut plain = TcpStream::connect(("127.0.0.1", house.agents[0].api_port)).unwrap();
+    plain.write_all(b"GET /v1/status HTTP/1.0\r\nHost: x\r\n\r\n").unwrap();
+    let mut answer = Vec::new();
+    // An alert and the end, or the end alone.
+    let _ = plain.read_to_end(&mut answer);
+    assert!(!answer.windows(4).any(|word| word == b"HTTP"), "{answer:?}");
 
     let strangers = House::build(0);
     operator(&strangers, "eve", "operate");
