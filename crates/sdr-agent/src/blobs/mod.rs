@@ -35,7 +35,7 @@ pub(crate) use fetch::FetchError;
 pub(crate) use store::{BLOB_BYTES_MAX, BlobHash, BlobStore, StoreError};
 
 /// First guess of a round trip; the library's own 333 ms would make a lost packet of a
-/// handshake cost a second (measured: `docs/security.md`).
+/// handshake cost a second.
 const ROUND_TRIP_GUESS: Duration = Duration::from_millis(50);
 /// A connection that is quiet for so long ends.
 const IDLE: Duration = Duration::from_secs(15);
