@@ -64,7 +64,9 @@ impl Brain {
         let next = holding.compared_at.map(|at| at + COMPARE_EVERY);
         if next.is_none_or(|at| now >= at) {
             holding.compared_at = Some(now);
-            self.compare(now, &mut holding);
+            if !self.desk_of_role.suspended {
+                self.compare(now, &mut holding);
+            }
             self.tell_succession(&mut holding);
         }
         self.wake_for_role(holding.compared_at.map_or(now, |at| at + COMPARE_EVERY));

@@ -90,6 +90,11 @@ impl RunBook {
         Self { last: reserved, reserved, stored: reserved }
     }
 
+    /// Runs up to `first` belong to other lives.
+    pub(super) fn begin_at(&mut self, first: Run) {
+        self.last = self.last.max(first);
+    }
+
     pub(super) fn fresh() -> Self {
         Self::from_disk(0)
     }

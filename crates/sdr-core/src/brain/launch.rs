@@ -15,6 +15,9 @@ use crate::{
     time::Instant,
 };
 
+/// Activations of one component within one life of an agent: one each five seconds for a day.
+const RUNS_PER_LIFE: u64 = 1 << 14;
+
 impl Brain {
     /// Starts a process unless something speaks against it for now.
     pub(super) fn launch_when_due(&mut self, now: Instant, key: &ComponentKey) {
@@ -63,16 +66,27 @@ impl Brain {
 
     /// Keeps a block of runs reserved on disk.
     fn reserve_runs(&mut self, key: &ComponentKey) {
+        let first = self.first_run();
         let book = self.runs.entry(key.clone()).or_insert_with(RunBook::fresh);
+        book.begin_at(first);
         if book.last + RUNS_RESERVED / 2 >= book.reserved {
             book.reserved = book.last.saturating_add(RUNS_RESERVED);
             self.desk.mark_urgent();
         }
     }
 
+    /// Runs of this life are greater than those of all lives before, also when the disk that
+    /// knew them is gone: others remember the life (rule 7).
+    pub(super) fn first_run(&self) -> Run {
+        let lives = self.mesh.incarnation().counter.saturating_sub(1);
+        u32::try_from(lives.saturating_mul(RUNS_PER_LIFE)).unwrap_or(Run::MAX - RUNS_RESERVED * 64)
+    }
+
     /// The next run, when it is on disk that it may have been used.
     pub(super) fn next_run(&mut self, key: &ComponentKey) -> Option<Run> {
+        let first = self.first_run();
         let book = self.runs.entry(key.clone()).or_insert_with(RunBook::fresh);
+        book.begin_at(first);
         let next = book.last.saturating_add(1);
         if next > book.stored {
             book.reserved = book.reserved.max(next.saturating_add(RUNS_RESERVED));

@@ -383,10 +383,8 @@ impl Brain {
                     self.plans.retry_soon();
                     self.stir = Stir::ALL;
                 }
-                MeshNews::Quiet(robot) => {
-                    let text = format!("{robot} is quiet; it is asked, and others are");
-                    self.event("robot-quiet", text);
-                }
+                // usual on a lossy link, over in a moment, and asked about by the mesh itself
+                MeshNews::Quiet(_) => {}
                 MeshNews::Isolated => {
                     self.stir = Stir::ALL;
                     self.event("isolated", "hears nobody; decides nothing for others");

@@ -85,7 +85,8 @@ impl Brain {
             return;
         }
         let fits = match &instance.told {
-            Told::Activate(token) => token.epoch == *epoch,
+            // an older life's run: this robot had forgotten how often it had lived
+            Told::Activate(token) => token.epoch == *epoch && token.run > self.first_run(),
             Told::Nothing | Told::Deactivate | Told::Finish => false,
         };
         let able = matches!(instance.state, LifecycleState::Inactive | LifecycleState::Active);

@@ -19,6 +19,11 @@ use crate::{
 /// News of another robot no older than two beats of the default gossip, with room for loss.
 const HEARD_WITHIN: Duration = Duration::from_millis(2500);
 
+/// Rule 7: who could compare with nobody waits so long before it mints.
+const ALONE_AFTER: Duration = Duration::from_secs(5);
+/// A free role is looked at so often.
+const STAND_EVERY: Duration = Duration::from_millis(100);
+
 /// What this robot remembers of the role beside the record.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RoleDesk {
@@ -27,6 +32,7 @@ pub(super) struct RoleDesk {
     /// It holds the role and hears nobody.
     pub(super) suspended: bool,
     pub(super) wake_at: Option<Instant>,
+    pub(super) stood_at: Option<Instant>,
     /// Why this robot takes the role, until it is on disk and said.
     pub(super) why: String,
 }
@@ -59,11 +65,21 @@ impl Brain {
         match holder {
             Some(holder) if holder == self.me => self.hold(now),
             Some(holder) => self.watch_holder(now, &holder),
-            None if self.may_stand(now) && self.is_first_choice() => {
-                let text = format!("fittest of {}", self.alive_robots().len());
-                self.take_role(&text);
-            }
-            None => {}
+            None => self.stand(now),
+        }
+    }
+
+    /// Nobody ever held the role, as far as is known here.
+    fn stand(&mut self, now: Instant) {
+        if self.desk_of_role.stood_at.is_some_and(|at| now < at + STAND_EVERY) {
+            self.wake_for_role(now + STAND_EVERY);
+            return;
+        }
+        self.desk_of_role.stood_at = Some(now);
+        self.wake_for_role(now + STAND_EVERY);
+        if self.may_stand(now) && self.has_witness() && self.is_first_choice() {
+            let text = format!("fittest of {}", self.alive_robots().len());
+            self.take_role(&text);
         }
     }
 
@@ -95,7 +111,9 @@ impl Brain {
     /// Rule 3: a robot speaks for another only when it hears somebody besides, unless the
     /// fleet is too small for that.
     pub(super) fn has_witness(&self) -> bool {
-        let known = self.mesh.authors().robots().count();
+        // after the loss of a disk nobody is known yet, but those it is to begin with
+        let seeds = self.config.seeds.iter().filter(|seed| Some(**seed) != self.config.listen);
+        let known = self.mesh.authors().robots().count().max(seeds.count() + 1);
         known <= 2 || self.mesh.heard_directly(self.handled_at, HEARD_WITHIN) >= 1
     }
 
@@ -104,11 +122,13 @@ impl Brain {
         if !self.may_hold(&self.me) || self.desk.is_minting() || self.desk.is_broken() {
             return false;
         }
-        let known = self.alive_robots().iter().all(|robot| self.facts(robot).is_some());
         let others = self.config.seeds.iter().filter(|seed| Some(**seed) != self.config.listen);
         let all_heard = self.mesh.alive().count() >= others.count();
-        let waited = now >= self.started_at + self.config.rejoin_wait;
-        known && (all_heard || waited)
+        // what this robot made before it lost its disk may still be known to others
+        let since = now.since(self.started_at);
+        let compared = self.mesh.is_in_step() || since >= ALONE_AFTER;
+        let known = || self.alive_robots().iter().all(|robot| self.facts(robot).is_some());
+        compared && (since >= self.config.rejoin_wait || (all_heard && known()))
     }
 
     /// What the holder said of its succession, when it speaks of the present term.

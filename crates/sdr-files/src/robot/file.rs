@@ -85,7 +85,7 @@ table! {
         listen: Option<At<String>>,
         /// Where others listen; the rest are learned.
         seeds: Option<At<Vec<At<String>>>>,
-        /// Time between two rounds of gossip; default 250ms.
+        /// Time between two rounds of gossip; default 350ms.
         gossip_period: Option<At<Duration>>,
         /// Age of the last news at which a robot counts as gone; default 10s.
         gone_after: Option<At<Duration>>,

@@ -76,9 +76,9 @@ pub(super) fn mesh(
     let mut within = |given: Option<At<Duration>>, default, range| {
         given.map_or(default, |at| bounded(&at, range, reader))
     };
-    let gossip_period = within(table.gossip_period, Duration::from_millis(250), (20, 10_000));
+    let gossip_period = within(table.gossip_period, Duration::from_millis(350), (20, 10_000));
     let gone_mark = table.gone_after.as_ref().map(|at| at.mark);
-    let gone_after = within(table.gone_after, Duration::from_secs(10), (100, 600_000));
+    let gone_after = within(table.gone_after, Duration::from_millis(11_500), (100, 600_000));
     let rejoin_wait = within(table.rejoin_wait, Duration::from_secs(2), (0, 60_000));
     let key_grace = within(table.key_grace, KEY_GRACE, (500, 3_600_000));
     if gone_after < gossip_period * 3 {

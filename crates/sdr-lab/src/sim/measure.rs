@@ -124,7 +124,7 @@ impl Measure {
             return;
         };
         let Some(table) = fleet.table(holder).filter(|_| holder != join.robot) else { return };
-        if table.len() == own.len() && table_hash(table) == table_hash(own) {
+        if table.root() == own.root() && table_hash(table) == table_hash(own) {
             let bytes = bytes_of(fleet, join.robot) - join.bytes_before;
             self.record.join_bytes.push(bytes as f64);
             self.join = None;

@@ -50,17 +50,34 @@ fn equal_tables(fleet: &Fleet, on: &[usize]) -> Option<String> {
     let length = |robot: &usize| fleet.table(*robot).map(FleetTable::len);
     let first = length(on.first()?);
     if let Some(other) = on.iter().find(|robot| length(robot) != first) {
-        return Some(format!(
-            "tables of robot-{} and robot-{} differ in length",
-            on[0] + 1,
-            other + 1
-        ));
+        return extra(fleet, on[0], *other).or_else(|| extra(fleet, *other, on[0]));
+    }
+    // the tables' own hashes first: only when they agree is it worth not to believe them
+    let root = |robot: &usize| fleet.table(*robot).map(FleetTable::root);
+    let of_first = root(on.first()?);
+    if let Some(other) = on.iter().find(|robot| root(robot) != of_first) {
+        return Some(format!("tables of robot-{} and robot-{} differ", on[0] + 1, other + 1));
     }
     let compared = on.len().min((RECORDS_MAX / first?.max(1)).max(2));
     let hash = |robot: &usize| fleet.table(*robot).map(table_hash);
     let first = hash(on.first()?);
     let other = on[..compared].iter().find(|robot| hash(robot) != first)?;
     Some(format!("tables of robot-{} and robot-{} differ", on[0] + 1, other + 1))
+}
+
+/// A record that one robot holds and the other does not.
+fn extra(fleet: &Fleet, holder: usize, other: usize) -> Option<String> {
+    let (table, other_table) = (fleet.table(holder)?, fleet.table(other)?);
+    let mut keys = (0..=u8::MAX).flat_map(|kind| table.of_kind(RecordKind(kind)));
+    let (key, version, _) = keys.find(|(key, ..)| other_table.record(key).is_none())?;
+    Some(format!(
+        "robot-{} holds {} (kind {}, revision {}), robot-{} does not",
+        holder + 1,
+        key.name,
+        key.kind.0,
+        version.revision,
+        other + 1
+    ))
 }
 
 fn each_once(fleet: &Fleet, on: &[usize]) -> Option<String> {

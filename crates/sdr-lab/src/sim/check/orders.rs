@@ -1,7 +1,7 @@
 //! Epochs, terms and revisions never go back, also through restarts; what others hold of a
 //! robot's making is on its disk; one version has one value.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use sdr_core::{
     mesh::{FleetRecord, FleetTable},
@@ -21,16 +21,24 @@ const RECORDS_MAX: usize = 20_000;
 pub struct Orders {
     /// By robot: the start of its agent, and the versions it held then.
     held: BTreeMap<usize, (u64, BTreeMap<FleetKey, Version>)>,
-    /// By robot: hash of the table at the last look; an equal one holds nothing new.
-    roots: BTreeMap<usize, Option<(u64, u64)>>,
+    /// By robot: its life and the hash of its table at the last look; an equal one holds
+    /// nothing new.
+    roots: BTreeMap<usize, (u64, u64)>,
+    /// Robots that lost a disk: others may rightly hold more of their making than they.
+    forgetful: BTreeSet<usize>,
     /// The value under each version ever seen of a home or the role.
     values: BTreeMap<(FleetKey, Version), u64>,
 }
 
 impl Checker for Orders {
     fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
-        if let Sight::On { robot, disk_kept: true } = sight {
-            return wire_before_disk(fleet, *robot);
+        if let Sight::On { robot, disk_kept } = sight {
+            let first = fleet.robots[*robot].life() == 1;
+            if !disk_kept && !first {
+                self.forgetful.insert(*robot);
+            }
+            let answers = *disk_kept && !self.forgetful.contains(robot);
+            return answers.then(|| wire_before_disk(fleet, *robot)).flatten();
         }
         let robots = 0..fleet.robots.len();
         let tables = robots.clone().filter_map(|robot| fleet.table(robot));
@@ -45,8 +53,8 @@ impl Checker for Orders {
 impl Orders {
     fn look(&mut self, fleet: &Fleet, robot: usize) -> Option<Broken> {
         let life = fleet.robots[robot].life();
-        let root = fleet.table(robot).map(|table| (life, table.root()));
-        if root.is_some() && self.roots.insert(robot, root) == Some(root) {
+        let root = (life, fleet.table(robot)?.root());
+        if self.roots.insert(robot, root) == Some(root) {
             return None;
         }
         let now: BTreeMap<FleetKey, Version> = records(fleet, robot)
