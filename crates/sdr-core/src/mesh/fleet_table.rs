@@ -158,6 +158,15 @@ impl FleetTable {
         self.records.get(key).map(|(record, _)| record)
     }
 
+    /// What makes an offered record of this key old: the greater one, or that of its system.
+    pub(super) fn newer_than(&self, key: &FleetKey) -> Option<&FleetRecord> {
+        let system = || {
+            let name = String::from(system_of_part(key)?);
+            self.record(&FleetKey { kind: RecordKind::SYSTEM, name })
+        };
+        self.record(key).or_else(system)
+    }
+
     /// All values of a kind, by name.
     pub fn of_kind(
         &self,

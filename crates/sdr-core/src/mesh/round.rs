@@ -222,7 +222,7 @@ impl Mesh {
     }
 
     /// Robots whose news matters most here: whom this robot guards, and the coordinator.
-    fn preferred(&self) -> BTreeSet<Seat> {
+    pub(super) fn preferred(&self) -> BTreeSet<Seat> {
         let holder = match self.fleet.get(RecordKind::ROLE, "") {
             Some((_, FleetValue::Role(role))) => self.authors.seat(&role.holder),
             Some(_) | None => None,

@@ -125,7 +125,13 @@ impl Mesh {
 
     /// Own records made since the last push, to many at once.
     pub(super) fn push_own(&mut self) {
-        let peers = self.peers.pick(&self.living_seats(), PUSH_PEERS, &mut self.rng);
+        let mut peers = self.peers.pick(&self.living_seats(), PUSH_PEERS, &mut self.rng);
+        // whoever decides hears it first
+        let deciding: Vec<SocketAddr> =
+            self.preferred().into_iter().filter_map(|seat| self.peers.address(seat)).collect();
+        peers.retain(|peer| !deciding.contains(peer));
+        peers.truncate(PUSH_PEERS.saturating_sub(deciding.len()));
+        peers.extend(deciding);
         self.spread.ride(Seat::OWN, self.spread.pushed);
         while self.spread.pushed < self.authors.at(Seat::OWN).sequence() {
             let own = self.authors.at(Seat::OWN);
@@ -235,7 +241,9 @@ impl Mesh {
                     self.news.push_back(MeshNews::Record(key.clone()));
                     fresh.push(key);
                 }
-                Merge::Older => newer.extend(self.fleet.record(&key).cloned()),
+                // also the tombstone that a part of a system is too old for: without it the
+                // other would offer its parts for ever
+                Merge::Older => newer.extend(self.fleet.newer_than(&key).cloned()),
                 Merge::Known if planted::is(Defect::EndlessEcho) => fresh.push(key),
                 Merge::Known => {}
                 Merge::Refused => self.counters.refused += 1,

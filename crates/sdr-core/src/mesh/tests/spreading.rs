@@ -139,3 +139,47 @@ fn what_nobody_here_understands_is_passed_on() {
     let key = FleetKey { kind: RecordKind(200), name: String::from("thing-1") };
     assert_eq!(bench.mesh(2).fleet().record(&key), Some(&thing(1)));
 }
+
+fn system(revision: u64, wanted: bool, author: usize) -> FleetRecord {
+    let name = crate::id::Name::new("mapping").unwrap();
+    let value = crate::record::FleetValue::System(crate::record::SystemRecord {
+        name: name.clone(),
+        receiver: robot(author),
+        components: 8 * u16::from(wanted),
+        connections: 0,
+        wanted,
+        since: revision,
+    });
+    let version = Version { epoch: None, revision, term: 0, author: robot(author) };
+    FleetRecord::new(RecordKind::SYSTEM, "mapping".into(), version, &value)
+}
+
+fn policy_part(revision: u64, name: &str, kind: RecordKind, author: usize) -> FleetRecord {
+    let value = crate::record::FleetValue::Recovery(crate::spec::PolicyBytes::default());
+    let version = Version { epoch: None, revision, term: 0, author: robot(author) };
+    FleetRecord::new(kind, name.into(), version, &value)
+}
+
+#[test]
+fn what_was_undeployed_behind_a_split_is_gone_everywhere_after_it() {
+    let mut bench = Bench::new(3, 0);
+    bench.run(Duration::from_secs(3));
+    let parts = [RecordKind::RECOVERY, RecordKind::ALLOCATION];
+    let mut records = vec![system(1, true, 1)];
+    records.extend(parts.map(|kind| policy_part(1, "mapping", kind, 1)));
+    // so many that they differ in more branches than one answer tells of
+    let parts = (0..30).map(|number| format!("mapping/p{number}"));
+    records.extend(parts.map(|name| policy_part(1, &name, RecordKind::RECOVERY, 1)));
+    bench.mesh(1).publish(records);
+    bench.run(Duration::from_secs(3));
+    bench.silence(1);
+    bench.run(Duration::from_secs(2));
+    bench.mesh(1).publish(vec![system(2, false, 1)]);
+    bench.mesh(0).publish(vec![role(0, 2)]);
+    bench.run(Duration::from_secs(10));
+    bench.cut.clear();
+    bench.run(Duration::from_secs(10));
+
+    let lengths: Vec<usize> = (0..3).map(|number| bench.mesh(number).fleet().len()).collect();
+    assert_eq!(lengths, [2, 2, 2]);
+}
