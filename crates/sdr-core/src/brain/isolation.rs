@@ -91,7 +91,7 @@ impl Brain {
     }
 
     /// A fleet of one: nobody could take over.
-    fn is_only_robot(&self) -> bool {
+    pub(super) fn is_only_robot(&self) -> bool {
         let seeds = self.config.seeds.iter().any(|seed| Some(*seed) != self.config.listen);
         !seeds && self.mesh.authors().robots().count() <= 1
     }

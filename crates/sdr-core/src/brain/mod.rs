@@ -25,6 +25,7 @@ mod judge;
 mod launch;
 mod minting;
 mod moves;
+mod newborn;
 mod plans;
 mod prepare;
 mod problem;
@@ -101,6 +102,8 @@ pub struct Brain {
     look_at: Instant,
     /// It may start what it remembers.
     began: bool,
+    /// Since when a newborn is in step with a peer.
+    met_at: Option<Instant>,
     instances: BTreeMap<InstanceId, Instance>,
     instance_last: InstanceId,
     runs: BTreeMap<ComponentKey, RunBook>,
@@ -146,11 +149,10 @@ impl Brain {
         stored: Option<StoredState>,
         now: Instant,
     ) -> Box<Self> {
+        // with an empty disk it is newborn: others may still know it, and correct it (rule 7)
+        let counter = stored.as_ref().map_or(0, |stored| stored.incarnation.saturating_add(1));
         let stored = stored.unwrap_or_default();
-        let own = Incarnation {
-            counter: stored.incarnation.saturating_add(1),
-            nonce: u32::try_from(config.seed >> 32).unwrap_or(0),
-        };
+        let own = Incarnation { counter, nonce: u32::try_from(config.seed >> 32).unwrap_or(0) };
         let mesh_config = MeshConfig {
             robot: config.robot.clone(),
             fleet: u32::try_from(hash64(config.fleet.as_bytes()) & 0xffff_ffff).unwrap_or(0),
@@ -176,6 +178,7 @@ impl Brain {
             stir: Stir::ALL,
             look_at: now,
             began: false,
+            met_at: None,
             instances: BTreeMap::new(),
             instance_last: 0,
             runs: runs.collect(),
@@ -293,6 +296,7 @@ impl Brain {
             .chain(self.desk_of_role.wake_at)
             .chain(self.lease.wake_at)
             .chain((!self.began).then(|| self.begin_deadline()))
+            .chain(self.newborn_deadline())
     }
 
     /// What this robot believes of the fleet, for the API.
@@ -354,6 +358,7 @@ impl Brain {
 
     /// A timer passed, the start is over, or nothing was looked at for long.
     fn notice_time(&mut self, now: Instant) {
+        self.consider_growing_up(now);
         let begins = !self.began && self.may_begin(now);
         self.began |= begins;
         if begins || now >= self.look_at || self.timer_at.is_some_and(|at| now >= at) {
@@ -409,7 +414,7 @@ impl Brain {
     /// for one long enough.
     fn may_begin(&self, now: Instant) -> bool {
         let alone = self.config.seeds.iter().all(|seed| Some(*seed) == self.config.listen);
-        self.mesh.is_in_step() || alone || now >= self.begin_deadline()
+        !self.is_newborn() && (self.mesh.is_in_step() || alone || now >= self.begin_deadline())
     }
 
     fn begin_deadline(&self) -> Instant {

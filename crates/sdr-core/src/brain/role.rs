@@ -5,7 +5,7 @@
 
 use alloc::{format, string::String, vec, vec::Vec};
 
-use super::{Brain, handover::Holding, takeover::Suspicion};
+use super::{Brain, handover::Holding, newborn::ALONE_AFTER, takeover::Suspicion};
 use crate::{
     id::RobotId,
     mesh::FleetRecord,
@@ -19,8 +19,6 @@ use crate::{
 /// News of another robot no older than two beats of the default gossip, with room for loss.
 const HEARD_WITHIN: Duration = Duration::from_millis(2500);
 
-/// Rule 7: who could compare with nobody waits so long before it mints.
-const ALONE_AFTER: Duration = Duration::from_secs(5);
 /// A free role is looked at so often.
 const STAND_EVERY: Duration = Duration::from_millis(100);
 
@@ -126,7 +124,7 @@ impl Brain {
         let all_heard = self.mesh.alive().count() >= others.count();
         // what this robot made before it lost its disk may still be known to others
         let since = now.since(self.started_at);
-        let compared = self.mesh.is_in_step() || since >= ALONE_AFTER;
+        let compared = !self.is_newborn() && (self.mesh.is_in_step() || since >= ALONE_AFTER);
         let known = || self.alive_robots().iter().all(|robot| self.facts(robot).is_some());
         compared && (since >= self.config.rejoin_wait || (all_heard && known()))
     }

@@ -226,6 +226,14 @@ impl Mesh {
         self.guard.set(robots, period, self.clock);
     }
 
+    /// Begins the first life of a robot that nobody corrected while it spoke as newborn
+    /// (counter 0), the one after `lives` that it cannot remember.
+    pub fn grow_up(&mut self, lives: u64) {
+        if self.own.counter == 0 {
+            self.begin_first_life(lives);
+        }
+    }
+
     /// Asks up to four living robots for fresh news of `robot`; what they know becomes part
     /// of this robot's judgement as it arrives.
     pub fn ask_about(&mut self, now: Instant, robot: &RobotId) {

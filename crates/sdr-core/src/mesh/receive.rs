@@ -44,6 +44,11 @@ impl Mesh {
         self.told.introduce(Seat::OWN);
     }
 
+    /// Nobody knew this robot from before: its first life begins.
+    pub(super) fn begin_first_life(&mut self, after: u64) {
+        self.outgrow(Incarnation { counter: after, nonce: self.own.nonce });
+    }
+
     pub(super) fn take_in(&mut self, from: SocketAddr, datagram: Datagram) {
         let header = datagram.header;
         let seat = match self.admit(&header.from, header.incarnation) {
