@@ -98,6 +98,7 @@ impl Brain {
             offered_to: said.and_then(|said| said.offered_to.as_ref()).map(ToString::to_string),
             reason: said.map(|said| said.reason.clone()).unwrap_or_default(),
             policy: self.role_policy().name.clone(),
+            rules: self.role_policy().clone(),
             candidates: self.candidates().iter().map(|robot| self.candidate_view(robot)).collect(),
         }
     }
