@@ -22,6 +22,13 @@ fn number_of(house: &House, name: &str) -> usize {
     house.agents.iter().position(|agent| agent.name == name).unwrap()
 }
 
+/// Whether every agent knows what to think of all three, and who follows.
+fn is_settled(house: &House) -> bool {
+    house.agents.iter().all(|agent| {
+        role(agent).is_some_and(|role| role.candidates.len() == 3 && role.successors.len() == 2)
+    })
+}
+
 /// The terms that an agent says it began to act under.
 fn taken(agent: &Agent) -> Vec<f64> {
     let events = agent.events("role-taken");
@@ -31,6 +38,7 @@ fn taken(agent: &Agent) -> Vec<f64> {
 #[test]
 fn the_role_is_given_by_hand_and_all_robots_agree() {
     let house = House::start(3);
+    house.wait("all know all", is_settled);
     let before = role(&house.agents[0]).unwrap();
     let old = number_of(&house, before.holder.as_ref().unwrap());
     let (next, asked) = ((old + 1) % 3, (old + 2) % 3);
@@ -69,9 +77,7 @@ fn the_role_is_given_by_hand_and_all_robots_agree() {
 #[test]
 fn another_robot_takes_over_from_a_killed_holder() {
     let mut house = House::start(3);
-    house.wait("the holder names its successors", |house| {
-        house.agents.iter().all(|agent| role(agent).is_some_and(|role| role.successors.len() == 2))
-    });
+    house.wait("all know all", is_settled);
     let before = role(&house.agents[0]).unwrap();
     let old = number_of(&house, before.holder.as_ref().unwrap());
     let left: Vec<usize> = (0..3).filter(|number| *number != old).collect();
@@ -100,6 +106,7 @@ fn another_robot_takes_over_from_a_killed_holder() {
 #[test]
 fn a_policy_given_to_one_robot_is_in_force_on_all() {
     let house = House::start(3);
+    house.wait("all know all", is_settled);
     let before = role(&house.agents[0]).unwrap();
     let old = before.holder.clone().unwrap();
     let file = house.folder().join("role.yaml");

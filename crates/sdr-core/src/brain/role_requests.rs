@@ -46,6 +46,9 @@ impl Brain {
             let names: Vec<&str> = alive.iter().map(RobotId::as_str).collect();
             return Some(format!("{to} is not alive here; alive: [{}]", names.join(", ")));
         }
+        if self.facts(to).is_none() {
+            return Some(format!("{to} has not told of itself here yet; ask again"));
+        }
         if !self.may_hold(to) {
             return Some(format!(
                 "{to} is forbidden as coordinator, by its robot.toml or the role policy"
