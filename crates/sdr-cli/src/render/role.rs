@@ -67,7 +67,10 @@ fn head(view: &StatusView, taken: Option<&Taken>) -> String {
     };
     let by = if role.by_operator { ", named by an operator" } else { "" };
     let since = taken.map_or_else(String::new, |taken| {
-        format!(", since {} ({})", clock(taken.wall_ms), one_line(&taken.reason))
+        // the term stands before it already
+        let term = format!("term {}, ", role.term);
+        let reason = taken.reason.strip_prefix(&term).unwrap_or(&taken.reason);
+        format!(", since {} ({})", clock(taken.wall_ms), one_line(reason))
     });
     format!("{holder} coordinates, term {}{by}{since}      seen from {}", role.term, view.seen_from)
 }

@@ -48,7 +48,7 @@ fn the_holder_its_successors_and_all_candidates_are_shown() {
     for arguments in [&["role"][..], &["role", "show"]] {
         let run = ask(&agent, arguments);
         assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
-        let head = "robot-1 coordinates, term 2, since 00:00:03.000 (term 2, fittest of 2)";
+        let head = "robot-1 coordinates, term 2, since 00:00:03.000 (fittest of 2)";
         assert!(run.stdout.starts_with(head), "{}", run.stdout);
         assert!(run.stdout.contains("successors: robot-2\n"), "{}", run.stdout);
         assert!(run.stdout.lines().all(|line| line.chars().count() <= 80), "{}", run.stdout);
