@@ -204,8 +204,11 @@ pub struct RoleView {
     pub offered_to: Option<String>,
     /// Why it is offered.
     pub reason: String,
-    /// The policy in force.
+    /// Name of the policy in force.
     pub policy: String,
+    /// The policy in force, as [`RolePolicyRequest`] takes it.
+    #[serde(default)]
+    pub rules: RolePolicy,
     /// Living robots that may hold it, the best first.
     pub candidates: Vec<CandidateView>,
 }

@@ -3,8 +3,12 @@
 //! Points run from 0 to 1000: the weighted mean of what each aspect scores. A robot below a
 //! bar is unfit whatever its points. All robots judge all others by the same policy.
 
-use alloc::{format, string::String, vec::Vec};
-use core::time::Duration;
+use alloc::{
+    format,
+    string::{String, ToString},
+    vec::Vec,
+};
+use core::{fmt, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +22,10 @@ const RSSI_RANGE_TENTHS: (i32, i32) = (-900, -500);
 /// Points are compared in steps of this size, so that noise and views of different age
 /// decide nothing.
 const POINTS_STEP: u32 = 50;
+/// Longest time that a fitter robot is made to wait for the role.
+const MARGIN_FOR_MAX: Duration = Duration::from_secs(3600);
+/// Longest wait of one successor for the other.
+const STAGGER_MAX: Duration = Duration::from_secs(10);
 
 /// How the holder of the role is chosen; one for the whole fleet.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -112,6 +120,23 @@ impl Default for RolePolicy {
     }
 }
 
+/// One thing that speaks against a policy. Whoever wrote the policy can mend it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RolePolicyProblem {
+    /// The key as a policy file has it, such as `bars.battery`.
+    pub key: &'static str,
+    /// What was found.
+    pub found: String,
+    /// What is allowed.
+    pub allowed: &'static str,
+}
+
+impl fmt::Display for RolePolicyProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}; allowed: {}", self.key, self.found, self.allowed)
+    }
+}
+
 /// Figures of one robot, as far as they are known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Figures {
@@ -148,21 +173,41 @@ impl Fitness {
 }
 
 impl RolePolicy {
-    /// What speaks against a policy; the error names the key, what was found and what is
-    /// allowed.
+    /// What speaks against a policy, the first thing as a sentence; [`Self::problems`] has all.
     pub fn check(&self) -> Result<(), String> {
-        let ms = self.beat.as_millis();
-        if !(50..=5000).contains(&ms) {
-            return Err(format!("beat: {ms} ms; allowed 50 ms to 5 s"));
+        self.problems().first().map_or(Ok(()), |problem| Err(problem.to_string()))
+    }
+
+    /// Everything that speaks against a policy.
+    pub fn problems(&self) -> Vec<RolePolicyProblem> {
+        let mut problems = Vec::new();
+        let mut tell = |fine: bool, key, found: String, allowed| {
+            if !fine {
+                problems.push(RolePolicyProblem { key, found, allowed });
+            }
+        };
+        let span = |time: Duration| format!("{} ms", time.as_millis());
+        let beats = Duration::from_millis(50)..=Duration::from_secs(5);
+        tell(beats.contains(&self.beat), "beat", span(self.beat), "50 ms to 5 s");
+        tell((2..=50).contains(&self.misses), "misses", format!("{}", self.misses), "2 to 50");
+        tell(self.margin <= 1000, "margin", format!("{}", self.margin), "0 to 1000 points");
+        tell(self.margin_for <= MARGIN_FOR_MAX, "margin_for", span(self.margin_for), "0 s to 1 h");
+        tell(self.stagger <= STAGGER_MAX, "stagger", span(self.stagger), "0 s to 10 s");
+        let shares = [
+            ("bars.battery", self.bars.battery_min),
+            ("bars.cpu_used", self.bars.cpu_max),
+            ("bars.memory_free", self.bars.memory_min),
+            ("bars.loss", self.bars.loss_max),
+        ];
+        for (key, bar) in shares {
+            let bar = bar.unwrap_or(Permille(0));
+            tell(bar.0 <= 1000, key, share(bar), "0 % to 100 %");
         }
-        if !(2..=50).contains(&self.misses) {
-            return Err(format!("misses: {}; allowed 2 to 50", self.misses));
+        for robot in self.pinned.iter().filter(|robot| self.forbidden.contains(robot)) {
+            let found = format!("{robot} is both pinned and forbidden");
+            tell(false, "forbidden", found, "one of the two");
         }
-        if self.margin > 1000 {
-            return Err(format!("margin: {}; points end at 1000", self.margin));
-        }
-        let both = self.pinned.iter().find(|robot| self.forbidden.contains(robot));
-        both.map_or(Ok(()), |robot| Err(format!("{robot} is both pinned and forbidden")))
+        problems
     }
 
     /// Judges one robot. What is unknown scores like the best: a robot on mains power has no
@@ -263,6 +308,25 @@ mod tests {
         let weak = Figures { battery: Some(Permille(123)), ..Figures::default() };
         let fitness = RolePolicy::default().judge(&weak);
         assert_eq!(fitness.unfit.as_deref(), Some("battery 12.3 %, bar 20.0 %"));
+    }
+
+    #[test]
+    fn all_that_speaks_against_a_policy_is_told() {
+        let default = RolePolicy::default();
+        assert_eq!(default.check(), Ok(()));
+        let robot = RobotId::new("robot-1").unwrap();
+        let bad = RolePolicy {
+            bars: RoleBars { cpu_max: Some(Permille(1001)), ..RoleBars::default() },
+            pinned: [robot.clone()].into(),
+            forbidden: [robot].into(),
+            margin: 1001,
+            beat: Duration::from_millis(49),
+            ..default
+        };
+        let keys: Vec<&str> = bad.problems().iter().map(|problem| problem.key).collect();
+        assert_eq!(keys, ["beat", "margin", "bars.cpu_used", "forbidden"]);
+        let told = bad.check().unwrap_err();
+        assert_eq!(told, "beat: 49 ms; allowed: 50 ms to 5 s");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::{
-    LoadedSystem, RobotConfig, load_allocation, load_recovery, load_robot, load_system,
+    LoadedSystem, RobotConfig, load_allocation, load_recovery, load_robot, load_role, load_system,
     problem::{Mark, Problems, Source},
     read::Reader,
     tree::{Body, parse_yaml},
@@ -20,6 +20,8 @@ pub enum FileKind {
     Allocation,
     /// A recovery policy.
     Recovery,
+    /// A policy of the coordinator role.
+    Role,
 }
 
 impl FileKind {
@@ -30,6 +32,7 @@ impl FileKind {
             Self::System => "system",
             Self::Allocation => "allocation policy",
             Self::Recovery => "recovery policy",
+            Self::Role => "role policy",
         }
     }
 }
@@ -45,6 +48,8 @@ pub enum LoadedFile {
     Allocation(Box<sdr_alloc::Policy>),
     /// A recovery policy.
     Recovery(sdr_recovery::Policy),
+    /// A policy of the coordinator role.
+    Role(Box<sdr_core::fitness::RolePolicy>),
 }
 
 impl LoadedFile {
@@ -55,6 +60,7 @@ impl LoadedFile {
             Self::System(_) => FileKind::System,
             Self::Allocation(_) => FileKind::Allocation,
             Self::Recovery(_) => FileKind::Recovery,
+            Self::Role(_) => FileKind::Role,
         }
     }
 }
@@ -85,8 +91,12 @@ pub fn detect(path: &Path) -> Result<FileKind, Problems> {
     if has("allocation") || has("strategy") {
         return Ok(FileKind::Allocation);
     }
+    if has("role") || has("weights") || has("bars") {
+        return Ok(FileKind::Role);
+    }
     let mut reader = Reader::new(source);
-    let help = "allowed: a file with the key `system`, `allocation` or `recovery`, or robot.toml";
+    let help =
+        "allowed: a file with the key `system`, `allocation`, `recovery` or `role`, or robot.toml";
     let start = Mark { line: 1, column: 1, width: 1 };
     reader.problem(start, "nothing says which kind of file this is", Some(help.to_owned()));
     reader.finish(None)
@@ -101,5 +111,6 @@ pub fn load_any(path: &Path) -> Result<LoadedFile, Problems> {
             load_allocation(path).map(|policy| LoadedFile::Allocation(Box::new(policy)))
         }
         FileKind::Recovery => load_recovery(path).map(LoadedFile::Recovery),
+        FileKind::Role => load_role(path).map(|policy| LoadedFile::Role(Box::new(policy))),
     }
 }

@@ -4,7 +4,7 @@
 //! ```text
 //!  text ──▶ tree (nodes with marks) ──▶ read (typed file) ──▶ checked type
 //!             syntax, duplicates         keys, units            RobotConfig, LoadedSystem,
-//!                     └────────────────────┴── Problems ──────▶ two policies
+//!                     └────────────────────┴── Problems ──────▶ three policies
 //! ```
 //!
 //! Every problem has file, line and column, says what was found and what is allowed, and
@@ -33,7 +33,7 @@ pub mod schema;
 mod system;
 
 pub use kind::{FileKind, LoadedFile, detect, load_any};
-pub use policy::{load_allocation, load_recovery};
+pub use policy::{load_allocation, load_recovery, load_role, role_text};
 pub use problem::{Problem, Problems};
 pub use robot::{RobotConfig, load_robot};
 pub use system::{LoadedSystem, link_profiles, load_system, parse_system};

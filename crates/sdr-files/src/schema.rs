@@ -1,21 +1,22 @@
-//! JSON schemas of the four kinds of files, from the types that they are read into.
+//! JSON schemas of the five kinds of files, from the types that they are read into.
 
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::Value;
 
 use crate::{
-    policy::{AllocationFile, RecoveryFile},
+    policy::{AllocationFile, RecoveryFile, RoleFile},
     robot::RobotFile,
     system::SystemFile,
 };
 
 /// Names and texts of all schemas, as they stand in `docs/schemas/NAME.json`.
-pub fn all() -> [(&'static str, String); 4] {
+pub fn all() -> [(&'static str, String); 5] {
     [
         ("robot", text::<RobotFile>("robot.toml")),
         ("system", text::<SystemFile>("system file")),
         ("allocation", text::<AllocationFile>("allocation policy")),
         ("recovery", text::<RecoveryFile>("recovery policy")),
+        ("role", text::<RoleFile>("policy of the coordinator role")),
     ]
 }
 

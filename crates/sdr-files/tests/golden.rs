@@ -66,8 +66,8 @@ fn bad_files_are_refused_in_the_words_expected() {
 #[test]
 fn good_files_are_taken() {
     let root = golden().join("../..");
-    let folders = ["tests/golden/good", "systems", "policies/allocation", "policies/recovery"];
-    for folder in folders {
+    let policies = ["policies/allocation", "policies/recovery", "policies/role"];
+    for folder in ["tests/golden/good", "systems"].into_iter().chain(policies) {
         for path in files(&root.join(folder)) {
             if let Err(problems) = load(&path) {
                 panic!("{problems}");

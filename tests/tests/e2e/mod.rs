@@ -4,3 +4,4 @@ mod by_hand;
 mod demo;
 mod garbage;
 mod keys;
+mod role;

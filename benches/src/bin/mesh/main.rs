@@ -220,7 +220,12 @@ fn knowing(seed: u64) {
     let mut taken = Vec::new();
     for term in 1..=10 {
         let holder = name(usize::try_from(term).expect("small") * 97);
-        let value = FleetValue::Role(RoleRecord { holder: holder.clone(), term, fitness: 1, by_operator: false });
+        let value = FleetValue::Role(RoleRecord {
+            holder: holder.clone(),
+            term,
+            fitness: 1,
+            by_operator: false,
+        });
         let version = Version { epoch: None, revision: 0, term, author: holder.clone() };
         let record = FleetRecord::new(RecordKind::ROLE, String::new(), version, &value);
         let begin = fleet.now;

@@ -50,6 +50,6 @@ pub(crate) async fn run(args: DeployArgs, session: &Session) -> Result<ExitCode,
 }
 
 fn refuse(found: &Problems, session: &Session) -> Result<ExitCode, Failure> {
-    problems::tell(found, session)?;
+    problems::tell(found, "nothing was deployed", session)?;
     Ok(ExitCode::FAILURE)
 }

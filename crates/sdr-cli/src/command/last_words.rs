@@ -52,7 +52,7 @@ pub(super) async fn of(placed: &Placed, status: &StatusView, client: &Client) ->
 }
 
 /// The agent of another robot of this machine.
-fn far_client(robot: &str, status: &StatusView) -> Option<Client> {
+pub(super) fn far_client(robot: &str, status: &StatusView) -> Option<Client> {
     let view = status.robots.iter().find(|view| view.name == robot)?;
     Path::new(&view.api).exists().then(|| Client::at(&view.api))
 }

@@ -35,20 +35,20 @@ impl ProblemReport {
     }
 }
 
-/// What `sdr deploy -o json` prints of a file that is refused.
+/// What `-o json` prints of a file that is refused.
 #[derive(Debug, Serialize)]
 struct Refusal {
     error: String,
     problems: Vec<ProblemReport>,
 }
 
-/// Says what is wrong with a file that was to be deployed.
-pub(super) fn tell(problems: &Problems, session: &Session) -> Result<(), Failure> {
+/// Says what is wrong with a file that was to be sent; `outcome` is what became of it.
+pub(super) fn tell(problems: &Problems, outcome: &str, session: &Session) -> Result<(), Failure> {
     let problems = problems.as_slice();
     for problem in problems {
         session.output.note(&problem.to_string())?;
     }
-    let error = format!("{}; nothing was deployed", count(problems.len(), "problem"));
+    let error = format!("{}; {outcome}", count(problems.len(), "problem"));
     session.output.note(&format!("sdr: {error}"))?;
     match session.output.format() {
         Format::Text => Ok(()),

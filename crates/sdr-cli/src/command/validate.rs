@@ -44,6 +44,7 @@ enum Kind {
     Robot,
     Allocation,
     Recovery,
+    Role,
 }
 
 impl Kind {
@@ -53,6 +54,7 @@ impl Kind {
             Self::Robot => "robot",
             Self::Allocation => "allocation policy",
             Self::Recovery => "recovery policy",
+            Self::Role => "role policy",
         }
     }
 }
@@ -80,6 +82,7 @@ pub(crate) async fn run(args: ValidateArgs, session: &Session) -> Result<ExitCod
             Kind::Robot => (sdr_files::load_robot(file).err(), Vec::new()),
             Kind::Allocation => (sdr_files::load_allocation(file).err(), Vec::new()),
             Kind::Recovery => (sdr_files::load_recovery(file).err(), Vec::new()),
+            Kind::Role => (sdr_files::load_role(file).err(), Vec::new()),
         };
         reports.push(report(file, kind, found.as_ref(), unchecked));
     }
@@ -144,6 +147,8 @@ fn kind_of(file: &Path) -> Kind {
         Kind::Recovery
     } else if has("allocation") || has("strategy") {
         Kind::Allocation
+    } else if has("role") || has("weights") || has("bars") {
+        Kind::Role
     } else {
         Kind::System
     }

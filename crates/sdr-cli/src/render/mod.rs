@@ -3,6 +3,7 @@
 pub(crate) mod event;
 pub(crate) mod problems;
 pub(crate) mod progress;
+pub(crate) mod role;
 pub(crate) mod status;
 pub(crate) mod table;
 pub(crate) mod units;

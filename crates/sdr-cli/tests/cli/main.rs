@@ -6,4 +6,5 @@ mod sdr;
 
 mod asking;
 mod files;
+mod role;
 mod waiting;

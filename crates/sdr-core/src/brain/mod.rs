@@ -26,6 +26,7 @@ mod launch;
 mod minting;
 mod moves;
 mod newborn;
+mod news;
 mod plans;
 mod prepare;
 mod problem;
@@ -44,7 +45,6 @@ mod tests;
 use alloc::{
     boxed::Box,
     collections::{BTreeMap, BTreeSet, VecDeque},
-    format,
     string::String,
     sync::Arc,
 };
@@ -56,7 +56,7 @@ use crate::{
     effect::{Effect, StoredState},
     id::{ComponentKey, Name, RobotId},
     input::{Input, InstanceId},
-    mesh::{FleetTable, Incarnation, Mesh, MeshConfig, MeshNews},
+    mesh::{FleetTable, Incarnation, Mesh, MeshConfig},
     order::hash64,
     planted::{self, Defect},
     recover::{Cause, Fault},
@@ -72,7 +72,7 @@ use moves::MoveWatch;
 use plans::PlanDesk;
 use role::RoleDesk;
 use say::Said;
-use systems::{Changed, SystemNow};
+use systems::SystemNow;
 
 /// A handler that was not called for so long was itself paused: it judges nobody by it.
 const PAUSE_MIN: Duration = Duration::from_millis(800);
@@ -365,49 +365,6 @@ impl Brain {
             self.stir = Stir::ALL;
             self.look_at = now + LOOK_EVERY;
         }
-    }
-
-    fn take_news(&mut self, now: Instant) {
-        let mut changed = Changed::default();
-        while let Some(news) = self.mesh.poll_news() {
-            match news {
-                MeshNews::Report(_) => self.stir = Stir::ALL,
-                MeshNews::Record(key) => {
-                    self.desk.mark_dirty();
-                    self.stir = Stir::ALL;
-                    changed.note(&key);
-                }
-                MeshNews::Alive(robot) => {
-                    let text = format!("{robot} is heard");
-                    self.event("robot-alive", text);
-                    if planted::is(Defect::RestartedByHeal) {
-                        let ids: alloc::vec::Vec<InstanceId> =
-                            self.instances.keys().copied().collect();
-                        ids.into_iter().for_each(|id| self.finish(id));
-                    }
-                    self.plans.retry_soon();
-                    self.stir = Stir::ALL;
-                }
-                // usual on a lossy link, over in a moment, and asked about by the mesh itself
-                MeshNews::Quiet(_) => {}
-                MeshNews::Isolated => {
-                    self.stir = Stir::ALL;
-                    self.event("isolated", "hears nobody; decides nothing for others");
-                }
-                MeshNews::Rejoined => {
-                    self.stir = Stir::ALL;
-                    self.event("rejoined", "hears others again");
-                }
-                MeshNews::Gone(robot) => self.note_gone(now, &robot),
-                MeshNews::DuplicateId(from) => {
-                    if self.duplicates_told.len() < 16 && self.duplicates_told.insert(from) {
-                        let text = format!("{from} speaks under this robot's name");
-                        self.event("duplicate-robot-id", text);
-                    }
-                }
-            }
-        }
-        self.refresh(&changed);
     }
 
     /// Whether this robot may start what it remembers: it is in step with a peer, or waited

@@ -46,6 +46,9 @@ impl Brain {
             let names: Vec<&str> = alive.iter().map(RobotId::as_str).collect();
             return Some(format!("{to} is not alive here; alive: [{}]", names.join(", ")));
         }
+        if self.facts(to).is_none() {
+            return Some(format!("{to} has not told of itself here yet; ask again"));
+        }
         if !self.may_hold(to) {
             return Some(format!(
                 "{to} is forbidden as coordinator, by its robot.toml or the role policy"
@@ -98,6 +101,7 @@ impl Brain {
             offered_to: said.and_then(|said| said.offered_to.as_ref()).map(ToString::to_string),
             reason: said.map(|said| said.reason.clone()).unwrap_or_default(),
             policy: self.role_policy().name.clone(),
+            rules: self.role_policy().clone(),
             candidates: self.candidates().iter().map(|robot| self.candidate_view(robot)).collect(),
         }
     }

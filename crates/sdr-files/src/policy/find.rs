@@ -18,7 +18,7 @@ const EXTENDS_MAX: usize = 8;
 pub(crate) trait PolicyFile: Read + JsonSchema {
     /// The checked policy.
     type Policy;
-    /// `allocation` or `recovery`.
+    /// `allocation`, `recovery` or `role`.
     const KIND: &'static str;
     /// Policies that every agent knows: name and text.
     const BUILT_IN: &'static [(&'static str, &'static str)];

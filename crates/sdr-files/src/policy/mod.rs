@@ -1,4 +1,5 @@
-//! The two policies of a system: where they are found, and what they say.
+//! The two policies of a system, and the fleet's policy of the coordinator role: where they
+//! are found, and what they say.
 //!
 //! A name is looked up as `policies/<kind>/<name>.yaml` in the folder of the file that names
 //! it, in the folder above, beside the file itself (for `extends`), and among the built-in
@@ -11,15 +12,21 @@ mod conditions;
 mod find;
 mod recovery;
 mod recovery_file;
+mod role;
+mod role_file;
+mod role_text;
 
 use std::path::Path;
 
 use sdr_alloc::Policy as AllocationPolicy;
+use sdr_core::fitness::RolePolicy;
 use sdr_recovery::Policy as RecoveryPolicy;
 
 pub(crate) use allocation_file::AllocationFile;
 pub(crate) use find::{Finder, PolicyEntry, PolicyFile};
 pub(crate) use recovery_file::RecoveryFile;
+pub(crate) use role_file::RoleFile;
+pub use role_text::role_text;
 
 use crate::problem::{Problems, Source};
 
@@ -31,6 +38,11 @@ pub fn load_allocation(path: &Path) -> Result<AllocationPolicy, Problems> {
 /// Reads and checks the recovery policy at `path`, with those it extends.
 pub fn load_recovery(path: &Path) -> Result<RecoveryPolicy, Problems> {
     find::load::<RecoveryFile>(Source::load(path)?, &Finder::beside(path))
+}
+
+/// Reads and checks the policy of the coordinator role at `path`, with those it extends.
+pub fn load_role(path: &Path) -> Result<RolePolicy, Problems> {
+    find::load::<RoleFile>(Source::load(path)?, &Finder::beside(path))
 }
 
 #[cfg(test)]

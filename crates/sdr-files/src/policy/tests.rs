@@ -12,6 +12,10 @@ fn recovery(text: &str) -> Result<RecoveryPolicy, Problems> {
     find::load::<RecoveryFile>(Source::new("r.yaml", text), &Finder::from(Path::new("/nowhere")))
 }
 
+fn role(text: &str) -> Result<RolePolicy, Problems> {
+    find::load::<RoleFile>(Source::new("c.yaml", text), &Finder::from(Path::new("/nowhere")))
+}
+
 #[test]
 fn the_default_files_say_what_is_built_in() {
     let placing = allocation(include_str!("../../../../policies/allocation/default.yaml"));
@@ -19,6 +23,44 @@ fn the_default_files_say_what_is_built_in() {
 
     let mending = recovery(include_str!("../../../../policies/recovery/default.yaml"));
     assert_eq!(mending.unwrap(), RecoveryPolicy::default());
+
+    let coordinating = role(include_str!("../../../../policies/role/default.yaml"));
+    assert_eq!(coordinating.unwrap(), RolePolicy::default());
+}
+
+#[test]
+fn a_role_policy_that_extends_changes_only_what_it_names_and_others_have_no_bars() {
+    let policy = role(
+        "role: base-first\nextends: default\nweights: { links: 9 }\nbars: { rssi: none, battery: \
+         { at_least: 35.5% } }\npinned: [robot-9]\nmargin: 300\nalone: wait\n",
+    )
+    .unwrap();
+    let mut expected = RolePolicy { name: "base-first".into(), ..RolePolicy::default() };
+    expected.weights.links = 9;
+    expected.bars.rssi_min = None;
+    expected.bars.battery_min = Some(sdr_core::units::Permille(355));
+    expected.pinned = vec![sdr_core::id::RobotId::new("robot-9").unwrap()];
+    expected.margin = 300;
+    expected.alone = sdr_core::fitness::Alone::Wait;
+    assert_eq!(policy, expected);
+
+    let bare = role("role: bare\n").unwrap();
+    assert_eq!(bare.bars, sdr_core::fitness::RoleBars::default());
+    assert_eq!(bare.weights, RolePolicy::default().weights);
+}
+
+#[test]
+fn a_role_policy_as_text_is_read_back_as_the_same() {
+    let odd = role(
+        "role: 'Base: \"first\"'\nextends: default\nbars: { battery: { at_least: 12.5% }, rssi: \
+         { at_least: -62.5dBm }, loss: none }\npinned: ['true', robot-1]\nforbidden: [off]\n\
+         margin_for: 1500ms\nbeat: 50.001ms\nstagger: 0s\nalone: wait\n",
+    )
+    .unwrap();
+    for policy in [odd, RolePolicy::default()] {
+        let text = role_text(&policy);
+        assert_eq!(role(&text).unwrap(), policy, "{text}");
+    }
 }
 
 #[test]
