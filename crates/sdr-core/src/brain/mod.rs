@@ -150,7 +150,8 @@ impl Brain {
         now: Instant,
     ) -> Box<Self> {
         // with an empty disk it is newborn: others may still know it, and correct it (rule 7)
-        let counter = stored.as_ref().map_or(0, |stored| stored.incarnation.saturating_add(1));
+        let lives = stored.as_ref().map_or(0, |stored| stored.incarnation);
+        let counter = if lives == 0 { 0 } else { lives.saturating_add(1) };
         let stored = stored.unwrap_or_default();
         let own = Incarnation { counter, nonce: u32::try_from(config.seed >> 32).unwrap_or(0) };
         let mesh_config = MeshConfig {

@@ -28,8 +28,7 @@ impl Brain {
                     let text = format!("{robot} is heard");
                     self.event("robot-alive", text);
                     if planted::is(Defect::RestartedByHeal) {
-                        let ids: Vec<InstanceId> =
-                            self.instances.keys().copied().collect();
+                        let ids: Vec<InstanceId> = self.instances.keys().copied().collect();
                         ids.into_iter().for_each(|id| self.finish(id));
                     }
                     self.plans.retry_soon();

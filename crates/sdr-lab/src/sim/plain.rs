@@ -9,8 +9,8 @@ use std::time::Duration;
 use sdr_core::{record::RecordKind, time::Instant};
 
 use super::{
-    Chance, Fault, Fleet, Incident, Record, Setup, Weather, air::FRAME_BYTES, fault::DiskFate,
-    fleet::BEGIN, measure::Measure, run::Run, systems,
+    Chance, Fault, Fleet, Incident, Record, Setup, Weather, fault::DiskFate, fleet::BEGIN,
+    measure::Measure, run::Run, systems,
 };
 
 /// Components of one system.

@@ -1,6 +1,9 @@
 //! A heal restarts nothing that was right.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    time::Duration,
+};
 
 use sdr_core::{id::Name, time::Instant};
 
@@ -18,6 +21,8 @@ const TROUBLE: [&str; 6] =
 pub struct Heals {
     healed_at: Option<Instant>,
     before: BTreeMap<usize, Vec<ActiveProcess>>,
+    /// What an operator asked on one side of a cut: the other hears of it by the heal.
+    asked: BTreeSet<Name>,
 }
 
 impl Checker for Heals {
@@ -27,10 +32,13 @@ impl Checker for Heals {
             self.before = (0..fleet.components())
                 .map(|component| (component, fleet.active_of(component).to_vec()))
                 .filter(|(_, active)| !active.is_empty())
+                .filter(|(component, _)| !self.asked.contains(&fleet.key(*component).system))
                 .collect();
+            self.asked.clear();
         }
         // an operator wants something else, or a component is in trouble of its own
         if let Sight::Asked { system, .. } = sight {
+            self.asked.extend(fleet.is_cut().then(|| system.clone()));
             self.excuse(fleet, system, None);
         }
         if let Sight::Told { event, .. } = sight
