@@ -29,7 +29,9 @@ impl Brain {
         if self.is_only_robot() || self.newborn_deadline().is_some_and(|at| now >= at) {
             let named = self.role().is_some_and(|role| role.holder == self.me)
                 || self.index.at(&self.me).next().is_some();
-            self.mesh.grow_up(if named { FORGOTTEN_LIVES } else { 0 });
+            // who met nobody cannot know either
+            let unknown = named || (self.met_at.is_none() && !self.is_only_robot());
+            self.mesh.grow_up(if unknown { FORGOTTEN_LIVES } else { 0 });
             self.desk.mark_urgent();
         }
     }

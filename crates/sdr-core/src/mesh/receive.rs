@@ -42,6 +42,8 @@ impl Mesh {
         self.authors.reincarnate(self.own);
         self.spread.say_anew();
         self.told.introduce(Seat::OWN);
+        // under the new life others know nothing of it
+        self.push_own();
     }
 
     /// Nobody knew this robot from before: its first life begins.
