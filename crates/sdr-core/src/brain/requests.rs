@@ -19,6 +19,9 @@ use crate::{
     spec::SystemSpec,
 };
 
+/// More revisions of one system than anybody has deployed.
+const FORGOTTEN_REVISIONS: u64 = 1000;
+
 impl Brain {
     pub(super) fn handle_deploy(&mut self, request: RequestId, system: SystemSpec) {
         if let Err(error) = system.check() {
@@ -43,7 +46,7 @@ impl Brain {
                     && now.connections.len() == system.connections.len()
             })
         });
-        let revision = before.unwrap_or(0) + u64::from(!unchanged);
+        let revision = before.unwrap_or_else(|| self.revisions_unseen()) + u64::from(!unchanged);
         let answer = DeployAnswer { system: name.to_string(), revision, changed: !unchanged };
         let answer = Accepted::System(answer);
         if unchanged {
@@ -94,6 +97,13 @@ impl Brain {
 
     pub(super) fn refuse(&mut self, request: RequestId, reason: String) {
         self.effects.push_back(Effect::Answer { request, result: Err(reason) });
+    }
+
+    /// Who compared with nobody since its disk was empty may have forgotten revisions that
+    /// others hold: what it is told now must not be taken for one of them.
+    fn revisions_unseen(&self) -> u64 {
+        let compared = self.mesh.is_in_step() || self.is_only_robot();
+        if compared { 0 } else { FORGOTTEN_REVISIONS }
     }
 
     fn system_revision(&self, name: &Name) -> Option<u64> {
