@@ -314,8 +314,8 @@ fn an_engine_is_made_from_bytes_and_says_whose_bytes_are_broken() {
 
 #[test]
 fn only_a_share_of_the_hold_time_can_pass_before_another_robot_prepares() {
-    let mut parts = sdr_recovery::Policy::default().parts().clone();
-    parts.limits.prepare_after = sdr_core::units::Permille(1200);
-    let error = sdr_recovery::Policy::new(parts).unwrap_err();
+    let mut parts = Policy::default().parts().clone();
+    parts.limits.prepare_after = Permille(1200);
+    let error = Policy::new(parts).unwrap_err();
     assert_eq!(error.to_string(), "limits: prepare_after is 120 %; at most 100 %");
 }
