@@ -1,6 +1,6 @@
 //! Defects planted on purpose: each is one that somebody could write, and the simulator's
 //! checkers must catch it. Compiled only with the feature `planted`, which nothing but the
-//! test of the checkers asks for; without it [`is`] is `false` and costs nothing.
+//! test of the checkers asks for; without it `is` is `false` and costs nothing.
 
 /// One defect. Its switch stands where the rule is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -78,6 +78,9 @@ impl Brain {
     /// Runs of this life are greater than those of all lives before, also when the disk that
     /// knew them is gone: others remember the life (rule 7).
     pub(super) fn first_run(&self) -> Run {
+        if planted::is(Defect::RunNotReserved) {
+            return 0;
+        }
         let lives = self.mesh.incarnation().counter.saturating_sub(1);
         u32::try_from(lives.saturating_mul(RUNS_PER_LIFE)).unwrap_or(Run::MAX - RUNS_RESERVED * 64)
     }
