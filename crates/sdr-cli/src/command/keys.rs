@@ -35,7 +35,7 @@ pub(crate) struct KeysArgs {
 enum KeysCommand {
     /// Make the authority of a fleet, on this machine
     Init {
-        /// The fleet's name, as [mesh] fleet of robot.toml has it
+        /// The fleet's name, as `fleet` below `mesh` in robot.toml has it
         #[arg(long, default_value = "fleet")]
         fleet: RobotId,
     },
