@@ -13,10 +13,6 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// What is foreseen is taken back so long after its cause was last seen, in shares of its
-/// hold time: a figure that jumps about its bar starts nothing twice.
-const LINGER: u32 = 1;
-
 /// A condition nobody could help with for so long counts as refused, so the ladder goes on.
 const HELP_WAIT: Duration = Duration::from_secs(5);
 
@@ -83,7 +79,8 @@ impl Brain {
                 self.stir.fleet = true;
                 condition.components.push(seen.component.name.clone());
             }
-            self.foreseen_until.insert(place, now + seen.hold * LINGER);
+            // a figure that jumps about its bar starts nothing twice
+            self.foreseen_until.insert(place, now + seen.hold);
         }
         self.foreseen_until.retain(|_, until| now < *until);
     }

@@ -1,8 +1,10 @@
 //! Measures what the figures are made of, by watching.
 
 use sdr_core::{
+    brain::Brain,
     event::Event,
     id::RobotId,
+    mesh::Standing,
     record::RecordKind,
     time::{Duration, Instant},
 };
@@ -76,8 +78,7 @@ impl Measure {
 
     fn told(&mut self, fleet: &Fleet, observer: usize, event: &Event) {
         match event.kind.as_str() {
-            "robot-gone" => self.judged(fleet, observer, event, true),
-            "robot-quiet" => self.judged(fleet, observer, event, false),
+            "robot-gone" => self.judged_gone(fleet, observer, event),
             "condition-raised" | "hung" | "exited" | "error" | "held" => {
                 self.troubled.insert(observer, fleet.now);
             }
@@ -92,27 +93,38 @@ impl Measure {
         }
     }
 
-    fn judged(&mut self, fleet: &Fleet, observer: usize, event: &Event, gone: bool) {
+    fn judged_gone(&mut self, fleet: &Fleet, observer: usize, event: &Event) {
         let words = event.reason.split(|c: char| !(c.is_alphanumeric() || c == '-'));
         let named = words.filter_map(|word| RobotId::new(word).ok());
         let target =
             named.filter_map(|id| fleet.robot_number(&id)).find(|robot| *robot != observer);
         let Some(target) = target else { return };
         if let Some(kill) = self.kills.iter_mut().find(|kill| kill.robot == target) {
-            let noted = if gone { &mut kill.gone[observer] } else { &mut kill.quiet[observer] };
-            if !std::mem::replace(noted, true) {
-                let took = ms(fleet.now.since(kill.at));
-                match gone {
-                    true => self.record.detection_ms.push(took),
-                    false => self.record.quiet_ms.push(took),
-                }
+            if !std::mem::replace(&mut kill.gone[observer], true) {
+                self.record.detection_ms.push(ms(fleet.now.since(kill.at)));
             }
-        } else if gone && is_false(fleet, observer, target) {
+        } else if is_false(fleet, observer, target) {
             self.record.false_deaths += 1;
         }
     }
 
+    /// Quiet is no event, since it is usual on a lossy link: it is read from the meshes.
+    fn look_at_quiet(&mut self, fleet: &Fleet) {
+        for kill in &mut self.kills {
+            let target = &fleet.robots[kill.robot].id;
+            for (observer, noted) in kill.quiet.iter_mut().enumerate().filter(|(_, noted)| !**noted)
+            {
+                let mesh = fleet.robots[observer].brain().map(Brain::mesh);
+                if mesh.is_some_and(|mesh| mesh.standing(target) != Standing::Alive) {
+                    *noted = true;
+                    self.record.quiet_ms.push(ms(fleet.now.since(kill.at)));
+                }
+            }
+        }
+    }
+
     fn look(&mut self, fleet: &Fleet) {
+        self.look_at_quiet(fleet);
         self.look_at_join(fleet);
         self.look_at_homes(fleet);
     }
