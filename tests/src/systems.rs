@@ -1,13 +1,8 @@
 //! Systems for the harness.
 
-use std::time::Duration;
-
 use sdr_core::{
     id::Name,
-    spec::{
-        ComponentSpec, ConnectionSpec, Execution, Isolation, IsolationAction, Launch, Needs, Place,
-        PolicyBytes, PortRef, Qos, Standby, SystemSpec,
-    },
+    spec::{ComponentSpec, ConnectionSpec, Needs, PolicyBytes, PortRef, Qos, SystemSpec},
     units::{Bytes, Permille},
 };
 
@@ -18,23 +13,8 @@ pub fn name(word: &str) -> Name {
 
 /// A component that needs `memory_mega` MB and a tenth of a core.
 pub fn component(word: &str, memory_mega: u64) -> ComponentSpec {
-    ComponentSpec {
-        name: name(word),
-        index: 0,
-        launch: Launch::Native { executable: word.into(), arguments: Vec::new() },
-        needs: Needs { memory: Bytes::mega(memory_mega), cpu: Permille(100) },
-        execution: Execution::Periodic { period: Duration::from_millis(66) },
-        devices: Vec::new(),
-        place: Place::default(),
-        after: Vec::new(),
-        actuator: false,
-        on_isolation: Isolation {
-            action: IsolationAction::Continue,
-            after: Duration::from_millis(500),
-        },
-        standby: Standby::default(),
-        parameters: Vec::new(),
-    }
+    let needs = Needs { memory: Bytes::mega(memory_mega), cpu: Permille(100) };
+    sdr_lab::sim::systems::component(name(word), word, needs)
 }
 
 /// `from.port -> to.port`.

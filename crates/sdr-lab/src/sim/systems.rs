@@ -20,12 +20,12 @@ pub fn name(word: &str, number: usize) -> Name {
     Name::new(&format!("{word}{number}")).expect("short words and numbers make names")
 }
 
-/// Components in a chain: each feeds the next through its port `out`.
-pub fn chain(system: Name, components: usize, needs: Needs) -> SystemSpec {
-    let component = |index: usize| ComponentSpec {
-        name: name("c", index),
+/// A component without wishes: 15 Hz, anywhere, going on when it is alone.
+pub fn component(name: Name, executable: &str, needs: Needs) -> ComponentSpec {
+    ComponentSpec {
+        name,
         index: 0,
-        launch: Launch::Native { executable: WORD.into(), arguments: Vec::new() },
+        launch: Launch::Native { executable: executable.into(), arguments: Vec::new() },
         needs,
         execution: Execution::Periodic { period: Duration::from_millis(66) },
         devices: Vec::new(),
@@ -38,7 +38,12 @@ pub fn chain(system: Name, components: usize, needs: Needs) -> SystemSpec {
         },
         standby: Standby::default(),
         parameters: Vec::new(),
-    };
+    }
+}
+
+/// Components in a chain: each feeds the next through its port `out`.
+pub fn chain(system: Name, components: usize, needs: Needs) -> SystemSpec {
+    let component = |index: usize| component(name("c", index), WORD, needs);
     let port = |component: usize, port: &str| PortRef {
         component: name("c", component),
         port: Name::new(port).expect("a word is a name"),
