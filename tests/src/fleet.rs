@@ -12,6 +12,7 @@ use sdr_core::{
     api::{ComponentView, DeployAnswer, StatusView},
     event::Event,
     id::RobotId,
+    input::Input,
     report::Usage,
     time::Instant,
     units::{Bytes, Dbm, Permille},
@@ -94,6 +95,14 @@ impl Fleet {
         #[expect(clippy::cast_possible_truncation, reason = "radio levels are small")]
         let tenths = (dbm * 10.0) as i16;
         self.robots[number].host.rssi = Some(Dbm::from_tenths(tenths));
+    }
+
+    /// A robot carries one more label from now on.
+    pub fn label(&mut self, number: usize, label: &str) {
+        let mut facts = self.robots[number].facts.clone();
+        facts.labels.push(label.into());
+        self.robots[number].facts = facts.clone();
+        self.tell(number, Input::Facts(Box::new(facts)));
     }
 
     /// What a robot that is on believes.

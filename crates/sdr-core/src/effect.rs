@@ -146,6 +146,9 @@ pub struct StoredState {
     pub runs: Vec<(ComponentKey, Run)>,
     /// Peers heard so far.
     pub peers: Vec<SocketAddr>,
+    /// Epochs reserved per component: numbers up to this one may have been sent.
+    #[serde(default)]
+    pub epochs: Vec<(ComponentKey, u64)>,
 }
 
 /// One record of the fleet table on disk.

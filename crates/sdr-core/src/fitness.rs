@@ -258,14 +258,19 @@ impl RolePolicy {
     /// Beats that may be missed on a link that loses `loss`: a false suspicion costs a
     /// question, so one of ten thousand is rare enough.
     pub fn misses_at(&self, loss: Permille) -> u32 {
-        let needed = match loss.0 {
-            0..150 => 4,
-            150..300 => 7,
-            300..500 => 12,
-            _ => 18,
-        };
-        self.misses.max(needed.min(self.misses.saturating_mul(4)))
+        misses_at(self.misses, loss)
     }
+}
+
+/// How many beats may be missed at this loss when `misses` may on a good link.
+pub(crate) fn misses_at(misses: u32, loss: Permille) -> u32 {
+    let needed = match loss.0 {
+        0..150 => 4,
+        150..300 => 7,
+        300..500 => 12,
+        _ => 18,
+    };
+    misses.max(needed.min(misses.saturating_mul(4)))
 }
 
 /// The worse of level and loss.

@@ -48,6 +48,10 @@ pub enum Defect {
     HomesNotStored,
     /// Samples of the home are not forwarded to other robots.
     SilentRoute,
+    /// A standby follows a silent home without asking anybody.
+    NoWitness,
+    /// A standby sends epochs that it never reserved on disk.
+    EpochNotReserved,
 }
 
 impl Defect {

@@ -73,7 +73,7 @@ pub struct Assignment {
     pub component: ComponentKey,
     /// Where the active instance runs.
     pub home: RobotId,
-    /// Standbys in order of succession. A move first lists its target here.
+    /// Standbys in order of succession; the home itself stands for one on the same robot.
     pub standbys: Vec<RobotId>,
     /// The home before, which may go on until its consumers have switched (a planned move).
     pub drains: Option<RobotId>,
@@ -81,6 +81,21 @@ pub struct Assignment {
     pub deployment: u64,
     /// Why, in a few words with numbers.
     pub reason: String,
+    /// Where it will move: an instance gets ready there and carries no epoch yet.
+    pub target: Option<RobotId>,
+}
+
+impl Assignment {
+    /// Robots beside the home that keep an instance or its place, each once.
+    pub fn others(&self) -> impl Iterator<Item = &RobotId> {
+        let target = self.target.iter().filter(|target| !self.standbys.contains(target));
+        self.standbys.iter().chain(target).filter(|robot| **robot != self.home)
+    }
+
+    /// Whether a second instance stands by on the home itself.
+    pub fn stands_by_at_home(&self) -> bool {
+        self.standbys.contains(&self.home)
+    }
 }
 
 /// Who holds the coordinator role; its term and holder are the record's version.

@@ -10,6 +10,7 @@ use core::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    fitness::Alone,
     id::ComponentKey,
     time::Instant,
     units::{Bytes, Dbm, Permille},
@@ -210,6 +211,24 @@ pub struct Foresight {
     pub reason: String,
 }
 
+/// How fast a standby on another robot follows its home.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GuardPolicy {
+    /// Time between two beats of the home, at least 10 ms.
+    pub period: Duration,
+    /// Beats that may be missed on a good link; a lossy one may miss more.
+    pub misses: u32,
+    /// What the one that is left of two robots does: nobody can tell it whether the other one
+    /// is gone or only unheard.
+    pub alone: Alone,
+}
+
+impl Default for GuardPolicy {
+    fn default() -> Self {
+        Self { period: Duration::from_millis(50), misses: 4, alone: Alone::Promote }
+    }
+}
+
 /// What came of a remedy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RemedyOutcome {
@@ -255,4 +274,7 @@ pub trait Recovery {
 
     /// How long a component must not come back to a robot that it left for a cause.
     fn not_back_for(&self) -> Duration;
+
+    /// How fast standbys follow.
+    fn guard(&self) -> GuardPolicy;
 }

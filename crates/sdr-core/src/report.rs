@@ -98,6 +98,8 @@ pub struct InstanceReport {
     pub heard: Vec<(u16, Token)>,
     /// Restarts under the present epoch.
     pub restarts: u16,
+    /// A second instance on the same robot could take over at once.
+    pub spare_ready: bool,
 }
 
 /// Measured use of one instance.

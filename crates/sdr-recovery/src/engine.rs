@@ -6,8 +6,8 @@ use core::time::Duration;
 use sdr_core::{
     id::ComponentKey,
     recover::{
-        Cause, CauseStatus, Evidence, Fault, Foresight, Recovery, Remedy, RemedyOutcome,
-        RobotEvidence, Verdict,
+        Cause, CauseStatus, Evidence, Fault, Foresight, GuardPolicy, Recovery, Remedy,
+        RemedyOutcome, RobotEvidence, Verdict,
     },
     spec::PolicyBytes,
     time::Instant,
@@ -298,6 +298,10 @@ impl Recovery for Engine {
                 (rule.cause, format!("{}: {fact} {found}, bar {bar}", rule.cause))
             })
         })
+    }
+
+    fn guard(&self) -> GuardPolicy {
+        self.policy.parts().limits.guard
     }
 
     fn not_back_for(&self) -> Duration {

@@ -3,7 +3,11 @@
 use alloc::{string::String, vec::Vec};
 use core::time::Duration;
 
-use sdr_core::{recover::Cause, spec::PolicyBytes, units::Permille};
+use sdr_core::{
+    recover::{Cause, GuardPolicy},
+    spec::PolicyBytes,
+    units::Permille,
+};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -14,7 +18,7 @@ use crate::{
 };
 
 /// First byte of an encoded policy; raised when fields change.
-pub const POLICY_VERSION: u8 = 2;
+pub const POLICY_VERSION: u8 = 3;
 
 /// Longest window over which samples are smoothed; it bounds what is kept.
 pub const MEDIAN_OVER_MAX: Duration = Duration::from_secs(60);
@@ -98,6 +102,8 @@ pub struct Limits {
     /// Share of a condition's hold time after which another robot gets ready for what would
     /// leave; all of it: never before.
     pub prepare_after: Permille,
+    /// How fast a standby on another robot follows a silent home.
+    pub guard: GuardPolicy,
 }
 
 /// Whether what moved away comes back by itself.
@@ -118,6 +124,7 @@ impl Default for Limits {
             settle: Duration::from_secs(10),
             retry: Backoff { min: Duration::from_secs(1), max: Duration::from_secs(30) },
             prepare_after: Permille(500),
+            guard: GuardPolicy::default(),
         }
     }
 }

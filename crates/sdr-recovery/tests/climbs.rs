@@ -308,7 +308,7 @@ fn an_engine_is_made_from_bytes_and_says_whose_bytes_are_broken() {
     let broken = PolicyBytes { name: "mine".into(), bytes: vec![9] };
     assert_eq!(
         make(&broken).err().unwrap(),
-        "recovery policy `mine`: policy version 9; this agent reads up to 2"
+        "recovery policy `mine`: policy version 9; this agent reads up to 3"
     );
 }
 

@@ -3,3 +3,4 @@
 mod deployment;
 mod recovery;
 mod role;
+mod standby;

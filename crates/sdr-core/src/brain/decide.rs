@@ -12,14 +12,14 @@ use alloc::{
 use super::{
     Brain,
     plans::{Asked, Purpose},
-    problem::Avoid,
+    problem::{Asking, Avoid, Place},
     systems::SystemNow,
 };
 use crate::{
     allocate::{AllocError, Plan, Tier},
     effect::Effect,
     event::Event,
-    id::{Name, RobotId},
+    id::{ComponentKey, Name, RobotId},
     input::PlanId,
     recover::{Cause, Remedy},
     report::{ConditionReport, Report},
@@ -40,18 +40,21 @@ impl Brain {
             if self.ask_for_orphans(now, &system)
                 || self.ask_for_leavers(now, &system)
                 || self.ask_for_homeless(now, &system)
+                || self.ask_for_standbys(now, &system)
             {
                 return;
             }
         }
     }
 
-    /// Systems with a home that is gone, a call for help, or a component without a home.
+    /// Systems with a home that is gone, a call for help, or a component without a home or
+    /// without a standby that it wishes for.
     fn systems_to_look_at(&self, now: Instant) -> Vec<Arc<SystemNow>> {
         let gone = self.index.homes().filter(|home| self.is_gone(home, now));
         let mut names: BTreeSet<&Name> =
             gone.flat_map(|home| self.index.at(home)).map(|key| &key.system).collect();
         names.extend(self.index.homeless.iter().map(|key| &key.system));
+        names.extend(self.index.backed.iter().map(|key| &key.system));
         let authors = self.mesh.alive().chain([&self.me]);
         let authors = authors.filter_map(|robot| self.mesh.authors().author(robot));
         for report in authors.flat_map(|author| author.reports()) {
@@ -70,8 +73,14 @@ impl Brain {
         let orphans = self.orphans(now, &system.name);
         let Some((_, reason)) = orphans.first() else { return false };
         let purpose = Purpose::Rehome { reason: reason.clone() };
-        let names: Vec<Name> = orphans.iter().map(|(key, _)| key.name.clone()).collect();
-        self.ask(now, system, &names, purpose)
+        let avoid = self.avoid(now, system, &names_of(&orphans));
+        let (backed, bare): (Vec<_>, Vec<_>) =
+            orphans.into_iter().partition(|(key, _)| self.best_standby(key, &avoid).is_some());
+        if !backed.is_empty() {
+            self.succeed_gone(&backed, &avoid);
+            return true;
+        }
+        self.ask(now, system, &names_of(&bare), purpose)
     }
 
     /// Components that a robot wants to be rid of, one robot and cause at a time.
@@ -79,11 +88,19 @@ impl Brain {
         for (from, condition) in self.calls_for_help(&system.name) {
             let leaves = |name: &&Name| {
                 self.wanted(&system.key(name)).is_some_and(|(_, assignment)| {
-                    assignment.home == from && assignment.standbys.is_empty()
+                    assignment.home == from && assignment.target.is_none()
                 })
             };
             let names: Vec<Name> = condition.components.iter().filter(leaves).cloned().collect();
             let (cause, reason) = (condition.cause, condition.reason.clone());
+            // a standby that runs already is the answer, and nothing has to be foreseen for it
+            let avoid = self.avoid(now, system, &names);
+            let backed = |name: &Name| self.best_standby(&system.key(name), &avoid).is_some();
+            let (backed, names): (Vec<Name>, Vec<Name>) = names.into_iter().partition(backed);
+            if !backed.is_empty() && !condition.foreseen {
+                self.move_to_standbys(now, system, &backed, (&from, &condition), &avoid);
+                return true;
+            }
             let purpose = match condition.foreseen {
                 true => Purpose::Prepare { from, cause, reason },
                 false => Purpose::Move { from, cause, reason },
@@ -123,18 +140,28 @@ impl Brain {
     }
 
     /// Asks the allocator, when the time for this question has come.
-    fn ask(&mut self, now: Instant, system: &SystemNow, names: &[Name], purpose: Purpose) -> bool {
+    pub(super) fn ask(
+        &mut self,
+        now: Instant,
+        system: &SystemNow,
+        names: &[Name],
+        purpose: Purpose,
+    ) -> bool {
         if !self.plans.is_due(&system.name, &purpose, now) {
             return false;
         }
-        let tier = match purpose {
-            Purpose::Deploy => Tier::Strict,
+        let (tier, place) = match purpose {
+            Purpose::Deploy => (Tier::Strict, Place::Given),
+            Purpose::Standby(_) => (Tier::Strict, Place::Kept),
             Purpose::Move { .. } | Purpose::Prepare { .. } | Purpose::Rehome { .. } => {
-                Tier::Relaxed
+                (Tier::Relaxed, Place::Given)
             }
         };
-        let avoid = self.avoid(now, system, names);
-        let problem = self.problem(system, names, tier, &avoid);
+        let mut avoid = self.avoid(now, system, names);
+        if let Purpose::Standby(side) = purpose {
+            self.avoid_shared_fate(system, side, &mut avoid);
+        }
+        let problem = self.problem(system, &Asking { names, tier, place, avoid: &avoid });
         if problem.robots.is_empty() {
             return false;
         }
@@ -155,7 +182,12 @@ impl Brain {
 
     /// Robots a component must not go to: those that are in trouble of their own, and those
     /// it left not long ago.
-    fn avoid(&self, now: Instant, system: &SystemNow, names: &[Name]) -> BTreeMap<Name, Avoid> {
+    pub(super) fn avoid(
+        &self,
+        now: Instant,
+        system: &SystemNow,
+        names: &[Name],
+    ) -> BTreeMap<Name, Avoid> {
         let mut avoid: BTreeMap<Name, Avoid> = BTreeMap::new();
         let calls = self.calls_for_help(&system.name);
         let ill = self.ill_robots(system);
@@ -210,6 +242,9 @@ impl Brain {
     }
 
     fn adopt(&mut self, now: Instant, asked: &Asked, plan: &Plan) {
+        if let Purpose::Standby(_) = asked.purpose {
+            return self.back_up(asked, plan);
+        }
         let foreseen = matches!(asked.purpose, Purpose::Prepare { .. });
         // nothing is missed yet of what is only foreseen, so nothing is said of it
         for homeless in plan.homeless.iter().filter(|_| !foreseen) {
@@ -232,8 +267,13 @@ impl Brain {
             Purpose::Deploy | Purpose::Rehome { .. } => self.assign(asked, plan),
             Purpose::Move { .. } => self.begin_move(now, asked, plan),
             Purpose::Prepare { .. } => self.prepare(now, asked, plan),
+            Purpose::Standby(_) => {}
         }
     }
+}
+
+fn names_of(orphans: &[(ComponentKey, String)]) -> Vec<Name> {
+    orphans.iter().map(|(key, _)| key.name.clone()).collect()
 }
 
 /// Why a component leaves; the rest of its reason stands behind it.
@@ -245,6 +285,7 @@ pub(super) fn leaving_reason(from: &RobotId, cause: Cause, reason: &str) -> Stri
 pub(super) fn placed_reason(asked: &Asked, placement: &crate::allocate::Placement) -> String {
     let mut reason = match &asked.purpose {
         Purpose::Deploy => String::new(),
+        Purpose::Standby(_) => String::from("standby; "),
         Purpose::Move { from, cause, reason } | Purpose::Prepare { from, cause, reason } => {
             leaving_reason(from, *cause, reason)
         }

@@ -26,8 +26,8 @@ impl Brain {
             evidence.push(Evidence {
                 fault,
                 actuator: spec.actuator,
-                standby_here: false,
-                standby_elsewhere: false,
+                standby_here: self.spare_is_ready(&component),
+                standby_elsewhere: !self.ready_standbys(&component).is_empty(),
                 memory: usage.memory,
                 cpu: usage.cpu,
                 cpu_limit: spec.needs.cpu,

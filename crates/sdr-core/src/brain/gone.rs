@@ -37,16 +37,18 @@ impl Brain {
         for spec in &running.components {
             let component = running.key(&spec.name);
             let Some(home) = self.home(&component) else { continue };
-            if !self.is_gone(home, now) || !self.lease_is_over(now, home, spec) {
+            let free = self.lease_is_over(now, home, spec);
+            if !self.is_gone(home, now) || !free || !self.succession_is_over(now, &component) {
                 continue;
             }
             let reason = format!("{home} is not heard any more");
+            let backed = !self.ready_standbys(&component).is_empty();
             evidence.push(Evidence {
                 component,
                 actuator: spec.actuator,
                 fault: Some(Fault { cause: Cause::RobotGone, reason }),
                 standby_here: false,
-                standby_elsewhere: false,
+                standby_elsewhere: backed,
                 memory: Bytes(0),
                 cpu: Permille(0),
                 cpu_limit: spec.needs.cpu,

@@ -1,13 +1,13 @@
 //! The holder's part: it beats to its successors, offers the role to a better one while it
 //! still talks, and rests when it hears nobody.
 
-use alloc::{format, string::String, vec::Vec};
+use alloc::{collections::BTreeMap, format, string::String, vec::Vec};
 
 use super::{Brain, role::count};
 use crate::{
     event::Event,
     id::RobotId,
-    mesh::{AuthorKey, Push},
+    mesh::{AuthorKey, BeatsFor, Push},
     report::{Report, SuccessionReport},
     time::{Duration, Instant},
 };
@@ -90,7 +90,7 @@ impl Brain {
     pub(super) fn let_go(&mut self) {
         self.desk_of_role.suspended = false;
         if self.desk_of_role.holding.take().is_some() {
-            self.mesh.beat_to(Vec::new(), self.role_policy().beat);
+            self.mesh.beat_to(BeatsFor::Succession, BTreeMap::new());
             self.mesh.retract(&AuthorKey::succession());
         }
     }
@@ -171,7 +171,8 @@ impl Brain {
         let mut order = self.successors();
         order.truncate(SUCCESSORS_MAX);
         if order != holding.order {
-            self.mesh.beat_to(order.clone(), beat);
+            let beats = order.iter().map(|robot| (robot.clone(), beat)).collect();
+            self.mesh.beat_to(BeatsFor::Succession, beats);
             holding.order.clone_from(&order);
         }
         let offer = holding.offer.as_ref();

@@ -7,20 +7,28 @@ use alloc::{
 };
 
 use super::Brain;
-use crate::id::{ComponentKey, RobotId};
+use crate::{
+    id::{ComponentKey, RobotId},
+    record::Assignment,
+};
 
 /// Components by what they are to this robot and to the coordinator.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Index {
     /// This robot is home, standby or old home, or runs an instance.
     pub(super) mine: BTreeSet<ComponentKey>,
-    /// They have a target or standby somewhere.
-    pub(super) standing_by: BTreeSet<ComponentKey>,
+    /// They have a target somewhere.
+    pub(super) moving: BTreeSet<ComponentKey>,
+    /// They wish for standbys, or have some.
+    pub(super) backed: BTreeSet<ComponentKey>,
     /// They are wanted and have no home.
     pub(super) homeless: BTreeSet<ComponentKey>,
     homes: BTreeMap<ComponentKey, RobotId>,
     /// Home -> components.
     at: BTreeMap<RobotId, BTreeSet<ComponentKey>>,
+    /// Robots that keep an instance, or the place for one, beside the home.
+    beside: BTreeMap<RobotId, BTreeSet<ComponentKey>>,
+    others: BTreeMap<ComponentKey, Vec<RobotId>>,
 }
 
 /// What has to be looked at again.
@@ -46,6 +54,11 @@ impl Index {
         self.at.get(robot).into_iter().flatten()
     }
 
+    /// Components with a standby or a target on `robot`, their home elsewhere.
+    pub(super) fn beside(&self, robot: &RobotId) -> impl Iterator<Item = &ComponentKey> {
+        self.beside.get(robot).into_iter().flatten()
+    }
+
     /// Robots that are home to something.
     pub(super) fn homes(&self) -> impl Iterator<Item = &RobotId> {
         self.at.keys()
@@ -53,15 +66,42 @@ impl Index {
 
     fn forget(&mut self, key: &ComponentKey) {
         self.mine.remove(key);
-        self.standing_by.remove(key);
+        self.moving.remove(key);
+        self.backed.remove(key);
         self.homeless.remove(key);
-        if let Some(home) = self.homes.remove(key)
-            && let Some(there) = self.at.get_mut(&home)
-        {
-            there.remove(key);
-            if there.is_empty() {
-                self.at.remove(&home);
-            }
+        if let Some(home) = self.homes.remove(key) {
+            take_out(&mut self.at, &home, key);
+        }
+        for robot in self.others.remove(key).unwrap_or_default() {
+            take_out(&mut self.beside, &robot, key);
+        }
+    }
+
+    fn enter(&mut self, key: &ComponentKey, assignment: &Assignment) {
+        if assignment.target.is_some() {
+            self.moving.insert(key.clone());
+        }
+        self.at.entry(assignment.home.clone()).or_default().insert(key.clone());
+        self.homes.insert(key.clone(), assignment.home.clone());
+        let others: Vec<RobotId> = assignment.others().cloned().collect();
+        for robot in &others {
+            self.beside.entry(robot.clone()).or_default().insert(key.clone());
+        }
+        if !others.is_empty() {
+            self.others.insert(key.clone(), others);
+        }
+    }
+}
+
+fn take_out(
+    lists: &mut BTreeMap<RobotId, BTreeSet<ComponentKey>>,
+    robot: &RobotId,
+    key: &ComponentKey,
+) {
+    if let Some(there) = lists.get_mut(robot) {
+        there.remove(key);
+        if there.is_empty() {
+            lists.remove(robot);
         }
     }
 }
@@ -71,25 +111,25 @@ impl Brain {
     pub(super) fn reindex(&mut self, key: &ComponentKey) {
         self.index.forget(key);
         let runs_here = self.instances.values().any(|instance| instance.component == *key);
-        let known = self.systems.get(&key.system).and_then(|system| system.component(&key.name));
-        let found = self.wanted(key).map(|(_, assignment)| {
-            let here = assignment.home == self.me
-                || assignment.standbys.contains(&self.me)
-                || assignment.drains.as_ref() == Some(&self.me);
-            (assignment.home.clone(), here, !assignment.standbys.is_empty())
+        let spec = self.systems.get(&key.system).and_then(|system| system.component(&key.name));
+        let wishes = spec.is_some_and(|spec| spec.standby.count > 0);
+        let found = self.wanted(key).map(|(_, assignment)| assignment.clone());
+        let here = found.as_ref().is_some_and(|assignment| {
+            assignment.home == self.me
+                || assignment.others().any(|robot| *robot == self.me)
+                || assignment.drains.as_ref() == Some(&self.me)
         });
-        if runs_here || found.as_ref().is_some_and(|(_, here, _)| *here) {
+        if runs_here || here {
             self.index.mine.insert(key.clone());
         }
         match found {
-            Some((home, _, stands_by)) => {
-                if stands_by {
-                    self.index.standing_by.insert(key.clone());
+            Some(assignment) => {
+                if wishes || !assignment.standbys.is_empty() {
+                    self.index.backed.insert(key.clone());
                 }
-                self.index.at.entry(home.clone()).or_default().insert(key.clone());
-                self.index.homes.insert(key.clone(), home);
+                self.index.enter(key, &assignment);
             }
-            None if known.is_some() => {
+            None if spec.is_some() => {
                 self.index.homeless.insert(key.clone());
             }
             None => {}

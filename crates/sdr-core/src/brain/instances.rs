@@ -26,7 +26,7 @@ pub(super) const RUNS_RESERVED: Run = 16;
 const MATCH_WAIT: Duration = Duration::from_millis(500);
 
 /// Pause before a prepared instance that failed is started again.
-const PREPARE_AGAIN: Duration = Duration::from_millis(500);
+pub(super) const PREPARE_AGAIN: Duration = Duration::from_millis(500);
 
 /// What this robot told an instance last.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -101,12 +101,16 @@ impl RunBook {
 }
 
 impl Brain {
-    /// The instance of a component that is not on its way out.
+    /// The instance of a component that acts, or will act first, and is not on its way out.
     pub(super) fn current(&self, key: &ComponentKey) -> Option<InstanceId> {
-        let of = |(_, instance): &(&InstanceId, &Instance)| {
-            instance.component == *key && !instance.is_ending()
-        };
-        self.instances.iter().find(of).map(|(id, _)| *id)
+        let acts = |id: &InstanceId| self.instances[id].is_told_to_act();
+        self.staying(key).find(acts).or_else(|| self.staying(key).next())
+    }
+
+    /// Instances of a component that are not on their way out, the eldest first.
+    pub(super) fn staying(&self, key: &ComponentKey) -> impl Iterator<Item = InstanceId> {
+        let stays = |instance: &Instance| instance.component == *key && !instance.is_ending();
+        self.instances.iter().filter(move |(_, instance)| stays(instance)).map(|(id, _)| *id)
     }
 
     pub(super) fn handle_usage(&mut self, figures: Vec<(InstanceId, Usage)>) {
@@ -130,7 +134,7 @@ impl Brain {
             InstanceNews::Hung { .. } if instance.is_ending() => self.kill_again(id),
             InstanceNews::Hung { reason } => {
                 self.event_about("hung", &key, reason.clone());
-                self.raise(&key, Cause::Hung, reason);
+                self.raise(id, &key, Fault { cause: Cause::Hung, reason });
                 self.kill(id);
             }
             InstanceNews::State { state, token, fault } => {
@@ -138,7 +142,7 @@ impl Brain {
                 let ending = self.instances.get(&id).is_none_or(Instance::is_ending);
                 if let Some((cause, reason)) = fault.filter(|_| !ending) {
                     self.event_about("error", &key, format!("{cause}: {reason}"));
-                    self.raise(&key, cause, reason);
+                    self.raise(id, &key, Fault { cause, reason });
                 }
             }
             InstanceNews::Heard { connection, token } => self.handle_heard(id, connection, token),
@@ -191,25 +195,30 @@ impl Brain {
 
     /// A process ended or never was; a fault unless it was told to end.
     fn lose(&mut self, id: InstanceId, key: &ComponentKey, cause: Cause, reason: String) {
-        let Some(instance) = self.instances.remove(&id) else { return };
-        self.reindex(key);
-        if instance.is_ending() {
+        let ending = self.instances.get(&id).is_none_or(Instance::is_ending);
+        if ending {
             self.event_about("ended", key, reason);
-            return;
+        } else {
+            self.event_about("exited", key, reason.clone());
+            self.raise(id, key, Fault { cause, reason });
         }
-        self.event_about("exited", key, reason.clone());
-        self.raise(key, cause, reason);
+        self.instances.remove(&id);
+        self.reindex(key);
     }
 
     /// Notes a fault of a component for the next judgement; what is only prepared here is
     /// simply tried again after a pause.
-    fn raise(&mut self, key: &ComponentKey, cause: Cause, reason: String) {
+    fn raise(&mut self, id: InstanceId, key: &ComponentKey, fault: Fault) {
         if self.home(key) != Some(&self.me) {
             let at = self.handled_at + PREPARE_AGAIN;
             self.restarts.insert(key.clone(), RestartPlan { at });
             return;
         }
-        self.faults.insert(key.clone(), Fault { cause, reason });
+        if self.current(key) != Some(id) {
+            self.spare_failed(key);
+            return;
+        }
+        self.faults.insert(key.clone(), fault);
         self.failed.insert(key.clone());
         self.judge_due = true;
     }

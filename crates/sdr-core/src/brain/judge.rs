@@ -7,7 +7,7 @@ use super::{Brain, index::Stir};
 use crate::{
     event::Event,
     id::{ComponentKey, Name},
-    recover::{Cause, CauseStatus, Evidence, Recovery, Remedy, RemedyOutcome, Verdict},
+    recover::{CauseStatus, Evidence, Recovery, Remedy, RemedyOutcome, Verdict},
     spec::PolicyBytes,
     time::{Duration, Instant},
 };
@@ -25,6 +25,10 @@ impl fmt::Debug for Engine {
 }
 
 impl Engine {
+    pub(super) fn policy(&self) -> &PolicyBytes {
+        &self.policy
+    }
+
     pub(super) fn next_deadline(&self) -> Option<Instant> {
         self.recovery.next_deadline()
     }
@@ -126,8 +130,7 @@ impl Brain {
                 self.restart(now, &verdict, after);
                 Some(RemedyOutcome::Done)
             }
-            // standbys on this robot are none yet: the ladder goes on
-            Remedy::LocalStandby => Some(RemedyOutcome::Refused),
+            Remedy::LocalStandby => Some(self.switch_here(&verdict)),
             Remedy::StandbyElsewhere | Remedy::LaunchElsewhere => {
                 self.ask_for_help(system, &verdict);
                 None
@@ -155,13 +158,7 @@ impl Brain {
         self.push_event(event.number("after_ms", millis(after)));
         self.restarts.insert(key.clone(), RestartPlan { at: now + after });
         self.said.count_restart(key);
-        if let Some(id) = self.current(key) {
-            if verdict.cause == Cause::Hung {
-                self.kill(id);
-            } else {
-                self.finish(id);
-            }
-        }
+        self.end_faulty(key, verdict.cause);
     }
 
     /// Forgets the trouble of a component that has nothing to do here any more.

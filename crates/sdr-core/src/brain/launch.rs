@@ -29,8 +29,13 @@ impl Brain {
         if !due || ending || !self.may_begin(now) || self.is_given_up(key) {
             return;
         }
-        let Some((spec, inputs, output_depth)) = self.shape_parts(key) else { return };
         self.restarts.remove(key);
+        self.launch(key);
+    }
+
+    /// Starts one more process.
+    pub(super) fn launch(&mut self, key: &ComponentKey) {
+        let Some((spec, inputs, output_depth)) = self.shape_parts(key) else { return };
         self.reserve_runs(key);
         self.instance_last += 1;
         let instance = self.instance_last;

@@ -37,6 +37,7 @@ pub(super) struct Desk {
     dirty: bool,
     mints: Vec<Mint>,
     runs_in_flight: BTreeMap<ComponentKey, Run>,
+    epochs_in_flight: BTreeMap<ComponentKey, u64>,
     spoken: bool,
     broken_at: Option<Instant>,
     /// What others made is stored at this time at the latest.
@@ -118,6 +119,9 @@ impl Brain {
         let runs: Vec<(ComponentKey, Run)> =
             self.runs.iter().map(|(key, book)| (key.clone(), book.reserved)).collect();
         self.desk.runs_in_flight = runs.iter().cloned().collect();
+        let epochs: Vec<(ComponentKey, u64)> =
+            self.epochs.iter().map(|(key, book)| (key.clone(), book.reserved)).collect();
+        self.desk.epochs_in_flight = epochs.iter().cloned().collect();
         let mut fleet = self.mesh.fleet().clone();
         for record in self.desk.mints.iter().flat_map(|mint| &mint.records) {
             fleet.merge(record.clone());
@@ -132,6 +136,7 @@ impl Brain {
             incarnation: self.mesh.incarnation().counter,
             fleet,
             runs,
+            epochs,
             peers: self.mesh.peer_addresses(),
         };
         self.effects.push_back(Effect::Store { ticket: self.desk.last, state });
@@ -144,6 +149,11 @@ impl Brain {
         }
         if self.desk.in_flight == Some(ticket) {
             self.desk.in_flight = None;
+            for (key, number) in core::mem::take(&mut self.desk.epochs_in_flight) {
+                if let Some(book) = self.epochs.get_mut(&key) {
+                    book.note_stored(number);
+                }
+            }
             for (key, run) in core::mem::take(&mut self.desk.runs_in_flight) {
                 if let Some(book) = self.runs.get_mut(&key) {
                     book.stored = book.stored.max(run);

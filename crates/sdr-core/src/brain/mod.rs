@@ -12,11 +12,14 @@
 
 mod conditions;
 mod config;
+mod deadlines;
 mod decide;
 mod effects;
+mod epochs;
 mod evidence;
 mod fitness;
 mod gone;
+mod guard;
 mod handover;
 mod index;
 mod instances;
@@ -36,6 +39,8 @@ mod role;
 mod role_requests;
 mod routes;
 mod say;
+mod spare;
+mod standbys;
 mod status;
 mod systems;
 mod takeover;
@@ -52,6 +57,7 @@ use alloc::{
 pub use config::{BrainConfig, MakeRecovery, Seams};
 
 use crate::{
+    allocate::Refusal,
     api::StatusView,
     effect::{Effect, StoredState},
     id::{ComponentKey, Name, RobotId},
@@ -63,6 +69,8 @@ use crate::{
     report::{ConditionReport, HostReport},
     time::{Duration, Instant},
 };
+use epochs::EpochBook;
+use guard::GuardDesk;
 use index::{Index, Stir};
 use instances::{Instance, RunBook};
 use isolation::Lease;
@@ -72,6 +80,7 @@ use moves::MoveWatch;
 use plans::PlanDesk;
 use role::RoleDesk;
 use say::Said;
+use spare::SparePlan;
 use systems::SystemNow;
 
 /// A handler that was not called for so long was itself paused: it judges nobody by it.
@@ -129,6 +138,11 @@ pub struct Brain {
     usage_due: bool,
     timer_at: Option<Instant>,
     drains: BTreeMap<ComponentKey, Instant>,
+    spare_plans: BTreeMap<ComponentKey, SparePlan>,
+    epochs: BTreeMap<ComponentKey, EpochBook>,
+    guard: GuardDesk,
+    /// Components that wish for a standby on another robot, and why none takes it.
+    unbacked: BTreeMap<ComponentKey, alloc::vec::Vec<Refusal>>,
 
     plans: PlanDesk,
     moves: BTreeMap<ComponentKey, MoveWatch>,
@@ -166,6 +180,8 @@ impl Brain {
         let mesh = Mesh::new(mesh_config, own, fleet, &stored.peers, now);
         let runs = stored.runs.into_iter().filter(|_| !planted::is(Defect::RunNotReserved));
         let runs = runs.map(|(key, run)| (key, RunBook::from_disk(run)));
+        let epochs = stored.epochs.into_iter();
+        let epochs = epochs.map(|(key, number)| (key, EpochBook::from_disk(number)));
         let mut brain = Box::new(Self {
             me: config.robot.clone(),
             config,
@@ -200,6 +216,10 @@ impl Brain {
             usage_due: false,
             timer_at: None,
             drains: BTreeMap::new(),
+            spare_plans: BTreeMap::new(),
+            epochs: epochs.collect(),
+            guard: GuardDesk::default(),
+            unbacked: BTreeMap::new(),
             plans: PlanDesk::default(),
             moves: BTreeMap::new(),
             left: BTreeMap::new(),
@@ -275,31 +295,6 @@ impl Brain {
         self.effects.pop_front()
     }
 
-    /// When `Input::Tick` is due at the latest.
-    pub fn next_deadline(&self) -> Option<Instant> {
-        // a timer that is already past was acted on and waits for something else
-        let timers = self.timers().filter(|at| *at > self.handled_at);
-        timers.chain([self.mesh.next_deadline(), self.look_at]).min()
-    }
-
-    /// All that is to be done at some time.
-    fn timers(&self) -> impl Iterator<Item = Instant> {
-        let restarts = self.restarts.values().map(|restart| restart.at);
-        let drains = self.drains.values().map(|since| *since + self.config.drain_max);
-        restarts
-            .chain(drains)
-            .chain(self.engines.values().filter_map(Engine::next_deadline))
-            .chain(self.plans.next_deadline())
-            .chain(self.instance_deadlines())
-            .chain(self.move_deadlines())
-            .chain(self.desk.retry_at())
-            .chain(self.desk.store_at())
-            .chain(self.desk_of_role.wake_at)
-            .chain(self.lease.wake_at)
-            .chain((!self.began).then(|| self.begin_deadline()))
-            .chain(self.newborn_deadline())
-    }
-
     /// What this robot believes of the fleet, for the API.
     pub fn status(&self, now: Instant) -> StatusView {
         self.status_view(now)
@@ -326,6 +321,7 @@ impl Brain {
         self.take_news(now);
         self.notice_time(now);
         self.consider_role(now);
+        self.watch_homes(now);
         if self.lease.wake_at.is_none_or(|at| now >= at) || self.stir.here {
             self.keep_lease(now);
         }
@@ -343,6 +339,7 @@ impl Brain {
             }
             if stir.here {
                 self.reconcile(now);
+                self.keep_beats();
                 self.say_instances(now);
                 self.update_routes();
             }

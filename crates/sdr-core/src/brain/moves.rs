@@ -1,12 +1,11 @@
 //! A move is: prepare, choose the new home under a new epoch, let the old one drain.
 //!
-//! The state of a move lives in the assignments (a target stands among the standbys), so
+//! The state of a move lives in the assignments (the target stands there), so
 //! that a new coordinator goes on where the last one stopped.
 
 use alloc::{
     format,
     string::{String, ToString},
-    vec,
     vec::Vec,
 };
 
@@ -17,7 +16,7 @@ use super::{
     prepare::Call,
 };
 use crate::{
-    allocate::{Placement, Plan},
+    allocate::Plan,
     event::Event,
     id::{ComponentKey, RobotId},
     lifecycle::LifecycleState,
@@ -40,6 +39,11 @@ pub(super) struct MoveWatch {
 }
 
 impl MoveWatch {
+    /// A move whose cause stands; the new home is chosen already when there is an epoch.
+    pub(super) fn started(now: Instant, from: &RobotId, epoch: Option<Epoch>) -> Self {
+        Self { since: now, from: Some(from.clone()), epoch, started: true }
+    }
+
     pub(super) fn foreseen(now: Instant, from: &RobotId) -> Self {
         Self { since: now, from: Some(from.clone()), epoch: None, started: false }
     }
@@ -47,7 +51,7 @@ impl MoveWatch {
 
 /// What the home before does when it hears of the new one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Old {
+pub(super) enum Old {
     /// Goes on until the consumers have switched.
     Drains,
     /// Stops its output at once.
@@ -74,7 +78,7 @@ impl Brain {
         }
     }
 
-    /// Lists the targets as standbys, so that they prepare.
+    /// Names the targets, so that they prepare.
     pub(super) fn begin_move(&mut self, now: Instant, asked: &Asked, plan: &Plan) {
         let Purpose::Move { from, .. } = &asked.purpose else { return };
         let mut records = Vec::new();
@@ -86,7 +90,7 @@ impl Brain {
                 .instance_report(from, key)
                 .is_some_and(|report| report.state == LifecycleState::Active);
             let record = match runs {
-                true => self.with_standby(placement, &reason),
+                true => self.with_target(key, &placement.robot, &reason),
                 false => self.new_home(key, &placement.robot, reason.clone(), Old::Stops),
             };
             let Some(record) = record else { continue };
@@ -94,9 +98,7 @@ impl Brain {
             records.push(record);
             let until = now + self.not_back_for(key);
             self.left.insert((key.clone(), from.clone()), until);
-            let from_home = Some(from.clone());
-            let watch = MoveWatch { since: now, from: from_home, epoch, started: true };
-            self.moves.insert(key.clone(), watch);
+            self.moves.insert(key.clone(), MoveWatch::started(now, from, epoch));
             let text = format!("{from} -> {}: {reason}", placement.robot);
             self.event_about("move-started", key, text);
         }
@@ -109,12 +111,12 @@ impl Brain {
     /// which moves are done.
     pub(super) fn advance_moves(&mut self, now: Instant) {
         self.finish_moves(now);
-        let standing_by: Vec<ComponentKey> = self.index.standing_by.iter().cloned().collect();
-        let preparing: Vec<(ComponentKey, RobotId)> = standing_by
+        let moving: Vec<ComponentKey> = self.index.moving.iter().cloned().collect();
+        let preparing: Vec<(ComponentKey, RobotId)> = moving
             .into_iter()
             .filter_map(|key| {
                 let (_, assignment) = self.wanted(&key)?;
-                Some((key, assignment.standbys.first()?.clone()))
+                Some((key, assignment.target.clone()?))
             })
             .collect();
         let (mut due, mut ready) = (0, Vec::new());
@@ -202,9 +204,8 @@ impl Brain {
         for (key, _) in targets {
             self.moves.remove(key);
             let Some((version, assignment)) = self.wanted(key) else { continue };
-            let value = Assignment { standbys: Vec::new(), ..assignment.clone() };
-            let version = Version { revision: version.revision + 1, ..self.next_version(version) };
-            records.push(record(key, version, value));
+            let value = Assignment { target: None, ..assignment.clone() };
+            records.push(record(key, self.next_revision(version), value));
         }
         self.mint(records, None);
     }
@@ -238,7 +239,7 @@ impl Brain {
     }
 
     /// An assignment under a new epoch.
-    fn new_home(
+    pub(super) fn new_home(
         &self,
         key: &ComponentKey,
         home: &RobotId,
@@ -253,39 +254,44 @@ impl Brain {
             {
                 epoch.clone()
             }
-            Some((Version { epoch: Some(epoch), .. }, _)) => epoch.next(&self.me),
-            Some(_) | None => Epoch::first(&self.me),
+            Some((version, _)) => self.next_epoch(key, version.epoch.as_ref()),
+            None => self.next_epoch(key, None),
         };
+        let standbys = self.standbys_after(key, home, old);
         let drains = before
             .map(|(_, before)| before.home)
             .filter(|before| before != home && old == Old::Drains);
         let value = Assignment {
             component: key.clone(),
             home: home.clone(),
-            standbys: Vec::new(),
+            standbys,
             drains,
             deployment,
             reason,
+            target: None,
         };
         let version =
             Version { epoch: Some(epoch), revision: 0, term: self.term(), author: self.me.clone() };
         Some(record(key, version, value))
     }
 
-    pub(super) fn with_standby(&self, placement: &Placement, reason: &str) -> Option<FleetRecord> {
-        let (version, assignment) = self.wanted(&placement.component)?;
-        let value = Assignment {
-            standbys: vec![placement.robot.clone()],
-            reason: reason.into(),
-            ..assignment.clone()
-        };
-        let version = Version { revision: version.revision + 1, ..self.next_version(version) };
-        Some(record(&placement.component, version, value))
+    /// The assignment with a target that is to get ready.
+    pub(super) fn with_target(
+        &self,
+        key: &ComponentKey,
+        target: &RobotId,
+        reason: &str,
+    ) -> Option<FleetRecord> {
+        let (version, assignment) = self.wanted(key)?;
+        let (target, reason) = (Some(target.clone()), reason.into());
+        let value = Assignment { target, reason, ..assignment.clone() };
+        Some(record(key, self.next_revision(version), value))
     }
 
-    /// `version` as this coordinator continues it.
-    fn next_version(&self, version: &Version) -> Version {
-        Version { term: self.term(), author: self.me.clone(), ..version.clone() }
+    /// The version of a change that chooses no new home.
+    pub(super) fn next_revision(&self, version: &Version) -> Version {
+        let (revision, term) = (version.revision + 1, self.term());
+        Version { revision, term, author: self.me.clone(), ..version.clone() }
     }
 
     pub(super) fn move_deadlines(&self) -> impl Iterator<Item = Instant> {
@@ -294,7 +300,7 @@ impl Brain {
     }
 }
 
-fn record(key: &ComponentKey, version: Version, value: Assignment) -> FleetRecord {
+pub(super) fn record(key: &ComponentKey, version: Version, value: Assignment) -> FleetRecord {
     let value = FleetValue::Assignment(value);
     FleetRecord::new(RecordKind::ASSIGNMENT, key.to_string(), version, &value)
 }

@@ -34,6 +34,17 @@ pub(super) enum Purpose {
     Prepare { from: RobotId, cause: Cause, reason: String },
     /// Components whose home is gone.
     Rehome { reason: String },
+    /// Components that wish for one more standby.
+    Standby(Side),
+}
+
+/// Where a standby should be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    /// On the robot of its home.
+    SameRobot,
+    /// On another one.
+    OtherRobot,
 }
 
 /// A question under way.
@@ -127,6 +138,8 @@ fn topic(system: &Name, purpose: &Purpose) -> String {
             topic.push_str(cause.word());
         }
         Purpose::Rehome { .. } => topic.push_str("/rehome"),
+        Purpose::Standby(Side::SameRobot) => topic.push_str("/standby/here"),
+        Purpose::Standby(Side::OtherRobot) => topic.push_str("/standby"),
     }
     topic
 }

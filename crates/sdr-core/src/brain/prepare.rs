@@ -29,7 +29,7 @@ pub(super) enum Call {
 }
 
 impl Brain {
-    /// Lists targets as standbys of what may have to leave.
+    /// Names targets for what may have to leave.
     pub(super) fn prepare(&mut self, now: Instant, asked: &Asked, plan: &Plan) {
         let Purpose::Prepare { from, .. } = &asked.purpose else { return };
         let mut records = Vec::new();
@@ -40,7 +40,8 @@ impl Brain {
                 .instance_report(from, key)
                 .is_some_and(|report| report.state == LifecycleState::Active);
             let reason = placed_reason(asked, placement);
-            let Some(record) = self.with_standby(placement, &reason).filter(|_| runs) else {
+            let target = &placement.robot;
+            let Some(record) = self.with_target(key, target, &reason).filter(|_| runs) else {
                 continue;
             };
             records.push(record);

@@ -8,21 +8,37 @@ use crate::{
     id::{ComponentKey, Name, RobotId},
     report::{InstanceReport, Report},
     spec::{ComponentSpec, Needs, launch_hash},
+    units::Bytes,
 };
 
 /// Robots a component must not go to, with reasons.
 pub(super) type Avoid = Vec<(RobotId, String)>;
 
+/// What becomes of the place that a component has already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// It leaves it.
+    Given,
+    /// It keeps it: a standby comes beside.
+    Kept,
+}
+
+/// A question about some components of one system.
+pub(super) struct Asking<'a> {
+    pub(super) names: &'a [Name],
+    pub(super) tier: Tier,
+    pub(super) place: Place,
+    pub(super) avoid: &'a BTreeMap<Name, Avoid>,
+}
+
 impl Brain {
-    /// The question where to put `names` of `system`.
-    pub(super) fn problem(
-        &self,
-        system: &SystemNow,
-        names: &[Name],
-        tier: Tier,
-        avoid: &BTreeMap<Name, Avoid>,
-    ) -> Problem {
-        let keys: Vec<ComponentKey> = names.iter().map(|name| system.key(name)).collect();
+    /// The question where to put some components of `system`.
+    pub(super) fn problem(&self, system: &SystemNow, asking: &Asking<'_>) -> Problem {
+        let Asking { names, tier, place, avoid } = *asking;
+        let leaving: Vec<ComponentKey> = match place {
+            Place::Given => names.iter().map(|name| system.key(name)).collect(),
+            Place::Kept => Vec::new(),
+        };
         let robots = self.alive_robots();
         let chosen = system.components.iter().filter(|component| names.contains(&component.name));
         let items = chosen
@@ -45,7 +61,7 @@ impl Brain {
             tier,
             policy: system.allocation.clone(),
             receiver: system.receiver.clone(),
-            robots: robots.iter().filter_map(|robot| self.offer(robot, &keys)).collect(),
+            robots: robots.iter().filter_map(|robot| self.offer(robot, &leaving)).collect(),
             items,
             settled: settled
                 .filter_map(|spec| {
@@ -105,10 +121,7 @@ impl Brain {
             let usage = Needs { memory: report.usage.memory, cpu: report.usage.cpu };
             taken.insert(report.component, usage);
         }
-        let prepared = self.index.standing_by.iter().filter(|key| {
-            self.wanted(key).is_some_and(|(_, assignment)| assignment.standbys.contains(robot))
-        });
-        for key in self.index.at(robot).chain(prepared) {
+        for key in self.index.at(robot).chain(self.index.beside(robot)) {
             let system = self.systems.get(&key.system);
             let Some(spec) = system.and_then(|system| system.component(&key.name)) else {
                 continue;
@@ -116,6 +129,12 @@ impl Brain {
             let needs = taken.entry(key.clone()).or_default();
             needs.memory = needs.memory.max(spec.needs.memory);
             needs.cpu = needs.cpu.max(spec.needs.cpu);
+            let twice = self.wanted(key).is_some_and(|(_, assignment)| {
+                assignment.home == *robot && assignment.stands_by_at_home()
+            });
+            if twice {
+                needs.memory = Bytes(needs.memory.0.saturating_mul(2));
+            }
         }
         taken.into_iter().filter(|(key, _)| !items.contains(key)).map(|(_, needs)| needs).collect()
     }

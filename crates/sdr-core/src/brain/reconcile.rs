@@ -1,6 +1,6 @@
 //! Every robot's part: what should be here against what is.
 
-use alloc::format;
+use alloc::{format, vec::Vec};
 
 use super::{Brain, instances::Told};
 use crate::{
@@ -49,7 +49,7 @@ impl Brain {
         }
         if assignment.home == self.me {
             Duty::Home(epoch)
-        } else if assignment.standbys.contains(&self.me) {
+        } else if self.keeps_instances(key).any(|robot| *robot == self.me) {
             Duty::Standby
         } else if assignment.drains.as_ref() == Some(&self.me) {
             Duty::Drain(epoch)
@@ -90,9 +90,12 @@ impl Brain {
             Told::Nothing | Told::Deactivate | Told::Finish => false,
         };
         let able = matches!(instance.state, LifecycleState::Inactive | LifecycleState::Active);
-        if !fits && able && self.predecessors_active(key) {
+        // what failed waits for its ladder's word, with a spare as without
+        let waits = self.failed.contains(key);
+        if !fits && able && !waits && self.predecessors_active(key) {
             self.activate(id, key, epoch);
         }
+        self.keep_spare(now, key);
     }
 
     /// It is the home, and must not act while nobody hears it.
@@ -118,6 +121,8 @@ impl Brain {
             self.launch_when_due(now, key);
             return;
         };
+        self.keep_spare(now, key);
+        self.reserve_epochs(key);
         let instance = &self.instances[&id];
         if self.shape(key).is_some_and(|shape| shape != instance.shape) {
             self.finish(id);
@@ -131,7 +136,9 @@ impl Brain {
     /// The old home of a planned move ends once the new one is active and heard, or after
     /// `drain_max`.
     fn drain(&mut self, now: Instant, key: &ComponentKey, epoch: &Epoch) {
-        let Some(id) = self.current(key) else { return };
+        if self.current(key).is_none() {
+            return;
+        }
         let since = *self.drains.entry(key.clone()).or_insert(now);
         let late = now >= since + self.config.drain_max;
         if (late || self.switched(key, epoch)) && !planted::is(Defect::DrainForever) {
@@ -141,7 +148,7 @@ impl Brain {
             };
             self.event_about("drained", key, reason);
             self.forget_here(key);
-            self.finish(id);
+            self.finish_all(key);
         }
     }
 
@@ -161,7 +168,12 @@ impl Brain {
             self.push_event(event);
         }
         self.forget_here(key);
-        self.finish(id);
+        self.finish_all(key);
+    }
+
+    fn finish_all(&mut self, key: &ComponentKey) {
+        let all: Vec<InstanceId> = self.staying(key).collect();
+        all.into_iter().for_each(|id| self.finish(id));
     }
 
     /// Whether the home under `epoch` is active and all its living consumers heard it.

@@ -65,7 +65,7 @@ impl Brain {
     /// Robots where a component runs or is prepared; a draining producer still feeds.
     fn places(&self, key: &ComponentKey, side: Side) -> BTreeSet<RobotId> {
         let Some((version, assignment)) = self.wanted(key) else { return BTreeSet::new() };
-        let mut places: BTreeSet<RobotId> = assignment.standbys.iter().cloned().collect();
+        let mut places: BTreeSet<RobotId> = self.keeps_instances(key).cloned().collect();
         places.insert(assignment.home.clone());
         let draining = assignment.drains.clone().filter(|_| match (&version.epoch, side) {
             (Some(epoch), Side::Producer) => !self.switched(key, epoch),

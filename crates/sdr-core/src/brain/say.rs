@@ -171,7 +171,8 @@ impl Brain {
         for id in ids {
             let report = self.own_report(id);
             let key = report.component.clone();
-            if self.instances[&id].is_ending() && self.current(&key).is_some() {
+            // one report a component: of the instance that acts, else of one that may
+            if self.current(&key).is_some_and(|current| current != id) {
                 continue;
             }
             spoken.insert(key.clone());
@@ -238,6 +239,7 @@ impl Brain {
             usage: instance.usage,
             heard: instance.heard.iter().map(|(index, token)| (*index, token.clone())).collect(),
             restarts: self.said.restarts_of(&instance.component),
+            spare_ready: self.spare_is_ready(&instance.component),
         }
     }
 

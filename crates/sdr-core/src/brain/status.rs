@@ -122,7 +122,9 @@ impl Brain {
             cpu_permille: usage.cpu.0,
             standbys: wanted
                 .map(|(_, assignment)| {
-                    assignment.standbys.iter().map(ToString::to_string).collect()
+                    let target = assignment.target.iter();
+                    let target = target.filter(|robot| !assignment.standbys.contains(robot));
+                    assignment.standbys.iter().chain(target).map(ToString::to_string).collect()
                 })
                 .unwrap_or_default(),
             reason: held

@@ -35,7 +35,10 @@ mod spread;
 mod tests;
 mod wire;
 
-use alloc::{collections::VecDeque, vec::Vec};
+use alloc::{
+    collections::{BTreeMap, VecDeque},
+    vec::Vec,
+};
 use core::{net::SocketAddr, time::Duration};
 
 pub use author::{Author, AuthorKey, Incarnation};
@@ -62,6 +65,7 @@ use links::Links;
 use liveness::Liveness;
 use peers::Peers;
 use repair::Repair;
+pub use round::BeatsFor;
 use round::{Guard, Told};
 use spread::Spread;
 
@@ -220,10 +224,10 @@ impl Mesh {
         self.spread_own(fresh);
     }
 
-    /// Sends small signs of life to `robots` every `period` from now on, whatever else is
-    /// said; to nobody when `robots` is empty.
-    pub fn beat_to(&mut self, robots: Vec<RobotId>, period: Duration) {
-        self.guard.set(robots, period, self.clock);
+    /// Sends small signs of life to these robots, each at its period, from now on, whatever
+    /// else is said; replaces what was asked for the same purpose before.
+    pub fn beat_to(&mut self, purpose: BeatsFor, beats: BTreeMap<RobotId, Duration>) {
+        self.guard.set(purpose, beats, self.clock);
     }
 
     /// Begins the first life of a robot that nobody corrected while it spoke as newborn

@@ -74,27 +74,61 @@ impl Told {
     }
 }
 
+/// Why a robot gets small signs of life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum BeatsFor {
+    /// It follows the holder of the coordinator role.
+    Succession,
+    /// It stands by for what runs here.
+    Standbys,
+}
+
 /// Robots that get a small sign of life more often.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Guard {
-    robots: Vec<RobotId>,
-    period: Duration,
-    due_at: Option<Instant>,
+    asked: BTreeMap<BeatsFor, BTreeMap<RobotId, Duration>>,
+    /// Each robot once: its shortest period, and when its next beat is due.
+    due: BTreeMap<RobotId, (Duration, Instant)>,
 }
 
 impl Guard {
-    pub(super) fn set(&mut self, robots: Vec<RobotId>, period: Duration, now: Instant) {
-        let period = period.max(GUARD_PERIOD_MIN);
-        if robots == self.robots && period == self.period {
+    pub(super) fn set(
+        &mut self,
+        purpose: BeatsFor,
+        beats: BTreeMap<RobotId, Duration>,
+        now: Instant,
+    ) {
+        if self.asked.get(&purpose).map_or(beats.is_empty(), |before| *before == beats) {
             return;
         }
-        self.due_at = (!robots.is_empty()).then_some(now);
-        self.robots = robots;
-        self.period = period;
+        self.asked.insert(purpose, beats);
+        let mut due: BTreeMap<RobotId, (Duration, Instant)> = BTreeMap::new();
+        for (robot, period) in self.asked.values().flatten() {
+            let period = (*period).max(GUARD_PERIOD_MIN);
+            let before = self.due.get(robot).map(|(_, at)| *at);
+            let next = before.map_or(now, |at| at.min(now + period));
+            let known = due.entry(robot.clone()).or_insert((period, next));
+            *known = (known.0.min(period), known.1.min(next));
+        }
+        self.due = due;
     }
 
     pub(super) fn next_deadline(&self) -> Option<Instant> {
-        self.due_at
+        self.due.values().map(|(_, at)| *at).min()
+    }
+
+    fn robots(&self) -> impl Iterator<Item = &RobotId> {
+        self.due.keys()
+    }
+
+    /// Those whose beat is due; their next ones are noted.
+    fn take_due(&mut self, now: Instant) -> Vec<RobotId> {
+        let due = self.due.iter_mut().filter(|(_, (_, at))| now >= *at);
+        due.map(|(robot, (period, at))| {
+            *at = now + *period;
+            robot.clone()
+        })
+        .collect()
     }
 }
 
@@ -119,11 +153,8 @@ impl Mesh {
 
     /// Guard beats that are due; each is the header and the link's mark alone.
     pub(super) fn beat_guards(&mut self) {
-        if self.guard.due_at.is_none_or(|at| self.clock < at) {
-            return;
-        }
-        self.guard.due_at = Some(self.clock + self.guard.period);
-        let seats = self.guard.robots.iter().filter_map(|robot| self.authors.seat(robot));
+        let due = self.guard.take_due(self.clock);
+        let seats = due.iter().filter_map(|robot| self.authors.seat(robot));
         let addresses: Vec<SocketAddr> =
             seats.filter_map(|seat| self.peers.address(seat)).collect();
         for address in addresses {
@@ -227,7 +258,7 @@ impl Mesh {
             Some((_, FleetValue::Role(role))) => self.authors.seat(&role.holder),
             Some(_) | None => None,
         };
-        let guarded = self.guard.robots.iter().filter_map(|robot| self.authors.seat(robot));
+        let guarded = self.guard.robots().filter_map(|robot| self.authors.seat(robot));
         guarded.chain(holder).collect()
     }
 

@@ -293,7 +293,7 @@ impl Mesh {
     fn concerned(&self, key: &FleetKey) -> Vec<RobotId> {
         match self.fleet.get(key.kind, &key.name) {
             Some((_, FleetValue::Assignment(assignment))) => {
-                let others = assignment.standbys.iter().chain(&assignment.drains);
+                let others = assignment.others().chain(&assignment.drains);
                 core::iter::once(&assignment.home).chain(others).cloned().collect()
             }
             Some(_) | None => Vec::new(),

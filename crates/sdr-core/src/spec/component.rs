@@ -34,7 +34,7 @@ pub struct ComponentSpec {
     pub actuator: bool,
     /// What it does when its robot hears nobody.
     pub on_isolation: Isolation,
-    /// Wished standbys. Carried from the first day; the rungs that use it come later.
+    /// Wished standbys.
     pub standby: Standby,
     /// Values for its parameters, by name, in the file's order.
     pub parameters: Vec<(String, Value)>,
@@ -117,7 +117,7 @@ pub enum IsolationAction {
 }
 
 /// Wished standbys.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Standby {
     /// How many, 0..=4.
     pub count: u8,
@@ -127,6 +127,8 @@ pub struct Standby {
     pub kind: StandbyKind,
     /// Time between two state checkpoints.
     pub checkpoint: Duration,
+    /// Labels, or kinds of labels (`rack` for `rack=2`), that it must not share with its home.
+    pub apart: Vec<String>,
 }
 
 impl Default for Standby {
@@ -136,6 +138,7 @@ impl Default for Standby {
             place: StandbyWhere::Any,
             kind: StandbyKind::Hot,
             checkpoint: Duration::from_secs(1),
+            apart: Vec::new(),
         }
     }
 }

@@ -1,16 +1,25 @@
 //! From a recovery policy as written to the checked one.
 
-use sdr_core::recover::Cause;
+use std::{ops::RangeInclusive, time::Duration};
+
+use sdr_core::recover::{Cause, GuardPolicy};
 use sdr_recovery::{Ladder, Limits, Policy, PolicyParts, Rule, Rung};
 
 use super::{
     conditions::trigger,
     find::{Finding, PolicyFile},
     recovery_file::{
-        LimitsTable, RecoveryFile, RuleChanges, RuleTable, RulesEntry, UnknownFact, cause_of,
+        GuardTable, LimitsTable, RecoveryFile, RuleChanges, RuleTable, RulesEntry, UnknownFact,
+        cause_of,
     },
 };
 use crate::read::{At, Map, Reader};
+
+/// Shortest and longest time between two beats of a home.
+const GUARD_PERIOD_MIN: Duration = Duration::from_millis(10);
+const GUARD_PERIOD_MAX: Duration = Duration::from_secs(1);
+/// Beats that may be missed.
+const GUARD_MISSES: RangeInclusive<u8> = 2..=20;
 
 impl PolicyFile for RecoveryFile {
     type Policy = Policy;
@@ -60,7 +69,7 @@ impl PolicyFile for RecoveryFile {
             }
         }
         if let Some(limits) = self.limits {
-            apply_limits(limits, &mut parts.limits);
+            apply_limits(limits, &mut parts.limits, reader);
         }
         match self.unknown.map(|at| at.value) {
             // What the rules do by themselves; the key says it to the reader.
@@ -173,7 +182,7 @@ fn known_ladder(
     Some(given.value)
 }
 
-fn apply_limits(given: LimitsTable, limits: &mut Limits) {
+fn apply_limits(given: LimitsTable, limits: &mut Limits, reader: &mut Reader) {
     if let Some(moves) = given.moves {
         limits.moves_per_hour = moves.value.0;
     }
@@ -194,5 +203,30 @@ fn apply_limits(given: LimitsTable, limits: &mut Limits) {
     }
     if let Some(share) = given.prepare_after {
         limits.prepare_after = share.value;
+    }
+    if let Some(guard) = given.guard {
+        apply_guard(guard, &mut limits.guard, reader);
+    }
+}
+
+fn apply_guard(given: GuardTable, guard: &mut GuardPolicy, reader: &mut Reader) {
+    if let Some(period) = given.period {
+        let found = period.value;
+        if !(GUARD_PERIOD_MIN..=GUARD_PERIOD_MAX).contains(&found) {
+            let message = format!("a beat each {found:?}");
+            reader.problem(period.mark, message, Some(String::from("allowed: 10ms to 1s")));
+        }
+        guard.period = found;
+    }
+    if let Some(misses) = given.misses {
+        let found = misses.value;
+        if !GUARD_MISSES.contains(&found) {
+            let message = format!("{found} missed beats");
+            reader.problem(misses.mark, message, Some(String::from("allowed: 2 to 20")));
+        }
+        guard.misses = u32::from(found);
+    }
+    if let Some(alone) = given.alone {
+        guard.alone = alone.value;
     }
 }

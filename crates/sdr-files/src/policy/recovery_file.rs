@@ -3,7 +3,7 @@
 use std::{num::NonZeroU8, time::Duration};
 
 use schemars::{Schema, SchemaGenerator, json_schema};
-use sdr_core::{recover::Cause, units::Permille};
+use sdr_core::{fitness::Alone, recover::Cause, units::Permille};
 use sdr_recovery::{Backoff, Restart, Return, Rung};
 
 use super::conditions::{ClearText, CpuOf, HoldTime, LevelText, Median};
@@ -103,6 +103,20 @@ table! {
         /// Share of a condition's `for` after which another robot gets ready; default 50%,
         /// 100%: never before the time is over.
         prepare_after: Option<At<Permille>>,
+        /// How fast a standby on another robot follows a home that is silent.
+        guard: Option<GuardTable>,
+    }
+}
+
+table! {
+    /// Beats between a home and its standbys.
+    pub(crate) struct GuardTable {
+        /// Time between two beats, 10ms to 1s; default 50ms.
+        period: Option<At<Duration>>,
+        /// Beats that may be missed on a good link, 2 to 20; default 4.
+        misses: Option<At<u8>>,
+        /// Of two robots, the one left: promote (default) or wait.
+        alone: Option<At<Alone>>,
     }
 }
 

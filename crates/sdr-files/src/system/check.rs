@@ -206,6 +206,7 @@ fn standby(table: StandbyTable, reader: &mut Reader) -> Standby {
         place: table.r#where.map_or(usual.place, |at| at.value),
         kind: table.kind.map_or(usual.kind, |at| at.value),
         checkpoint: table.checkpoint.map_or(usual.checkpoint, |at| at.value),
+        apart: table.apart.map_or(usual.apart, |at| at.value),
     }
 }
 

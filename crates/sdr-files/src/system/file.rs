@@ -78,7 +78,7 @@ table! {
         after: Option<At<Vec<At<Name>>>>,
         /// Where it may run.
         place: Option<PlaceTable>,
-        /// Wished standbys; carried, but used by later versions only.
+        /// Wished standbys.
         standby: Option<StandbyTable>,
         /// What it does when its robot hears nobody.
         on_isolation: Option<At<IsolationEntry>>,
@@ -116,6 +116,8 @@ table! {
         kind: Option<At<StandbyKind>>,
         /// Time between two state checkpoints; default 1s.
         checkpoint: Option<At<Duration>>,
+        /// Labels, or kinds of labels (`rack` for `rack=2`), that it must not share with its home.
+        apart: Option<At<Vec<String>>>,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use sdr_core::{spec::SystemSpec, time::Instant, units::Dbm};
+use sdr_core::{input::InstanceId, spec::SystemSpec, time::Instant, units::Dbm};
 
 use super::{
     air::{Cut, Way, Weather},
@@ -246,6 +246,11 @@ impl Fleet {
     /// The processes of a component on a robot end by themselves.
     pub fn kill(&mut self, robot: usize, word: &str) {
         self.turn_at(robot, word, &Turn::Exit("killed by signal 9"));
+    }
+
+    /// One process ends by itself.
+    pub fn end_process(&mut self, robot: usize, instance: InstanceId) {
+        self.turn(robot, instance, Turn::Exit("killed by signal 9"));
     }
 
     /// The processes of a component on a robot stop answering.

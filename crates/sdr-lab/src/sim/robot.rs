@@ -183,10 +183,12 @@ impl Robot {
         self.processes.iter()
     }
 
-    /// Its processes of a component.
+    /// Its processes of a component: those that act, else all.
     pub(crate) fn instances_of(&self, word: &str) -> Vec<InstanceId> {
-        let of = self.processes.iter().filter(|(_, p)| p.component.name.as_str() == word);
-        of.map(|(id, _)| *id).collect()
+        let of = || self.processes.iter().filter(|(_, p)| p.component.name.as_str() == word);
+        let acting: Vec<InstanceId> =
+            of().filter(|(_, p)| p.token.is_some()).map(|(id, _)| *id).collect();
+        if acting.is_empty() { of().map(|(id, _)| *id).collect() } else { acting }
     }
 
     /// What it measures of itself now.

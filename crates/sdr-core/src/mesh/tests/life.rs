@@ -1,6 +1,6 @@
 //! Who is taken for alive, and by whom.
 
-use alloc::{string::ToString, vec, vec::Vec};
+use alloc::{string::ToString, vec::Vec};
 use core::time::Duration;
 
 use super::{super::*, Bench, address, robot};
@@ -122,7 +122,8 @@ fn others_are_asked_for_fresh_news() {
 fn guard_beats_come_at_their_own_pace() {
     let mut bench = Bench::new(3, 0);
     bench.run(Duration::from_secs(2));
-    bench.mesh(0).beat_to(vec![robot(1)], Duration::from_millis(50));
+    let beats = BTreeMap::from([(robot(1), Duration::from_millis(50))]);
+    bench.mesh(0).beat_to(BeatsFor::Standbys, beats);
     bench.run(Duration::from_secs(1));
 
     let now = bench.now;
@@ -130,7 +131,7 @@ fn guard_beats_come_at_their_own_pace() {
     let sent = bench.mesh(0).traffic();
     assert!((18..=22).contains(&sent.guard) && sent.guard_bytes < sent.guard * 60, "{sent:?}");
 
-    bench.mesh(0).beat_to(Vec::new(), Duration::from_millis(50));
+    bench.mesh(0).beat_to(BeatsFor::Standbys, BTreeMap::new());
     bench.run(Duration::from_secs(1));
     assert_eq!(bench.mesh(0).traffic().guard, sent.guard);
 }
