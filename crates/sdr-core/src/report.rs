@@ -63,6 +63,12 @@ pub struct HostReport {
     pub rssi: Option<Dbm>,
     /// Where it stands.
     pub position: Option<Position>,
+    /// Of the memory used: by others than the agent and its components; nothing where the
+    /// capacity was set by hand.
+    pub memory_other: Bytes,
+    /// Of the CPU used: by others, mean of the last seconds; nothing where the capacity was set
+    /// by hand.
+    pub cpu_other: Permille,
 }
 
 /// What the agent measured of one pair of robots.

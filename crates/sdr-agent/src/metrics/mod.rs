@@ -35,6 +35,9 @@ pub(crate) use watch::Watch;
 /// Time between two reports of unchanged instances.
 const USAGE_PERIOD: Duration = Duration::from_secs(1);
 
+/// Samples whose mean counts as what others use of the CPU.
+const SAMPLES_KEPT: u32 = 32;
+
 /// What is sampled, and how often.
 #[derive(Clone, Debug)]
 pub(crate) struct MetricsConfig {
@@ -70,7 +73,9 @@ impl Metrics {
     ) -> io::Result<Self> {
         let sampler = Sampler::new()?;
         let machine = host::Machine::new(clock::now());
-        let desk = Desk { config, watch: watch.clone(), inputs, record, sampler, machine };
+        let cpu_other = Permille(0);
+        let desk =
+            Desk { config, watch: watch.clone(), inputs, record, sampler, machine, cpu_other };
         let thread = thread::Builder::new().name("metrics".into()).spawn(move || desk.run())?;
         Ok(Self { watch, thread: Some(thread) })
     }
@@ -93,6 +98,7 @@ struct Desk {
     record: RecordSender,
     sampler: Sampler,
     machine: host::Machine,
+    cpu_other: Permille,
 }
 
 impl Desk {
@@ -123,9 +129,13 @@ impl Desk {
 
     fn report_host(&mut self, sample: &Sample) -> HostReport {
         let now = clock::now();
+        let (memory_used, cpu_used) = (self.memory_used(sample), self.cpu_used(now, sample));
+        self.cpu_other = mean(self.cpu_other, cpu_used.less(sample.cpu));
         let host = HostReport {
-            memory_used: self.memory_used(sample),
-            cpu_used: self.cpu_used(now, sample),
+            memory_used,
+            cpu_used,
+            memory_other: memory_used.less(sample.memory),
+            cpu_other: self.cpu_other,
             battery: self.config.sensors.battery(now),
             rssi: self.config.radio.as_ref().and_then(Radio::level),
             position: self.config.sensors.position(now),
@@ -169,4 +179,10 @@ impl Desk {
             agent_cpu_permille: sample.agent_cpu.0,
         }
     }
+}
+
+/// The mean of the last samples, some seconds of them: a burst of others is no reason to place
+/// anything differently.
+fn mean(before: Permille, now: Permille) -> Permille {
+    Permille((before.0 * (SAMPLES_KEPT - 1) + now.0) / SAMPLES_KEPT)
 }

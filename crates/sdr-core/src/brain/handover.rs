@@ -138,7 +138,10 @@ impl Brain {
     fn better_holder(&self, passed_over: Option<&RobotId>) -> Option<Better> {
         let policy = self.role_policy();
         let candidates = self.candidates();
-        let best = candidates.iter().find(|robot| Some(*robot) != passed_over)?;
+        // nobody gets the role for what is not known of it
+        let known = |robot: &&RobotId| self.figures_of(robot).is_some();
+        let mut others = candidates.iter().filter(|robot| **robot == self.me || known(robot));
+        let best = others.find(|robot| Some(*robot) != passed_over)?;
         if *best == self.me {
             return None;
         }

@@ -6,7 +6,7 @@ use super::Brain;
 use crate::{
     api::Accepted,
     effect::{Effect, StoredRecord, StoredState},
-    id::ComponentKey,
+    id::{ComponentKey, Name},
     input::{RequestId, StoreTicket},
     mesh::FleetRecord,
     order::Run,
@@ -70,6 +70,15 @@ impl Desk {
     /// Whether something made here is not in the table yet.
     pub(super) fn is_minting(&self) -> bool {
         !self.mints.is_empty()
+    }
+
+    /// The revision of a system that waits for the disk.
+    pub(super) fn revision_under_way(&self, system: &Name) -> Option<u64> {
+        let records = self.mints.iter().flat_map(|mint| &mint.records);
+        let own = records.filter(|record| {
+            record.key.kind == RecordKind::SYSTEM && record.key.name == system.as_str()
+        });
+        own.map(|record| record.version.revision).max()
     }
 
     /// When to try a broken disk again.

@@ -110,6 +110,12 @@ impl PlanDesk {
         self.retries.clear();
     }
 
+    /// A system is another one now: what was refused before says nothing.
+    pub(super) fn forget(&mut self, system: &Name) {
+        let of_system = |topic: &String| topic.split('/').next() == Some(system.as_str());
+        self.retries.retain(|topic, _| !of_system(topic));
+    }
+
     /// Asks nothing for a while.
     pub(super) fn pause(&mut self, now: Instant) {
         for retry in self.retries.values_mut() {

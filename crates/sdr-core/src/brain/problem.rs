@@ -94,8 +94,10 @@ impl Brain {
     /// What a robot has left beside all that is or will be there, without `items`.
     fn offer(&self, robot: &RobotId, items: &[ComponentKey]) -> Option<RobotOffer> {
         let facts = self.facts(robot)?;
-        let host = self.host_of(robot).copied().unwrap_or_default();
-        let (mut memory, mut cpu) = (facts.memory_capacity, facts.cpu_capacity);
+        let mine = (*robot == self.me).then_some(self.host).flatten();
+        let host = mine.or_else(|| self.host_of(robot).copied()).unwrap_or_default();
+        let mut memory = facts.memory_capacity.less(host.memory_other);
+        let mut cpu = facts.cpu_capacity.less(host.cpu_other);
         for needs in self.taken(robot, items) {
             memory = memory.less(needs.memory);
             cpu = cpu.less(needs.cpu);

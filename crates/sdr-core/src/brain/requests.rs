@@ -32,20 +32,23 @@ impl Brain {
         }
         let name = system.name.clone();
         let before = self.system_revision(&name);
-        let unchanged = before.is_some_and(|revision| {
-            let records = self.records_of(&system, revision);
-            records.iter().all(|record| {
-                record.key.kind == RecordKind::SYSTEM
-                    || self
-                        .mesh
-                        .fleet()
-                        .record(&record.key)
-                        .is_some_and(|k| k.value == record.value)
-            }) && self.systems.get(&name).is_some_and(|now| {
-                now.components.len() == system.components.len()
-                    && now.connections.len() == system.connections.len()
-            })
-        });
+        // what was asked a moment ago may still be on its way to the disk
+        let settled = self.desk.revision_under_way(&name).is_none();
+        let unchanged = settled
+            && before.is_some_and(|revision| {
+                let records = self.records_of(&system, revision);
+                records.iter().all(|record| {
+                    record.key.kind == RecordKind::SYSTEM
+                        || self
+                            .mesh
+                            .fleet()
+                            .record(&record.key)
+                            .is_some_and(|k| k.value == record.value)
+                }) && self.systems.get(&name).is_some_and(|now| {
+                    now.components.len() == system.components.len()
+                        && now.connections.len() == system.connections.len()
+                })
+            });
         let revision = before.unwrap_or_else(|| self.revisions_unseen()) + u64::from(!unchanged);
         let answer = DeployAnswer { system: name.to_string(), revision, changed: !unchanged };
         let answer = Accepted::System(answer);
@@ -108,7 +111,8 @@ impl Brain {
 
     fn system_revision(&self, name: &Name) -> Option<u64> {
         let found = self.mesh.fleet().get(RecordKind::SYSTEM, name.as_str());
-        found.map(|(version, _)| version.revision)
+        let known = found.map(|(version, _)| version.revision);
+        known.max(self.desk.revision_under_way(name))
     }
 
     fn deployment_version(&self, revision: u64) -> Version {

@@ -119,14 +119,25 @@ impl Brain {
         let new = whole.map(Arc::new);
         keys.extend(before.iter().chain(&new).flat_map(|s| s.keys().collect::<Vec<_>>()));
         match new {
-            Some(system) => self.systems.insert(name, system),
+            Some(system) => self.systems.insert(name.clone(), system),
             None => self.systems.remove(&name),
         };
         self.update_objectors();
-        if redeployed {
-            // an operator's new revision is a fresh chance for what was given up
-            keys.iter().for_each(|key| self.forget_here(key));
+        if redeployed || self.systems.contains_key(&name) != before.is_some() {
+            self.begin_anew(&name, keys);
         }
+    }
+
+    /// What an operator asks for now, or takes back, is a fresh chance for what was given up.
+    fn begin_anew(&mut self, system: &Name, keys: &BTreeSet<ComponentKey>) {
+        self.plans.forget(system);
+        for key in keys.iter().filter(|key| key.system == *system) {
+            self.forget_here(key);
+            self.call_off(key);
+            self.spare_plans.remove(key);
+            self.unbacked.remove(key);
+        }
+        self.judge_due = true;
     }
 
     fn assemble(&self, revision: u64, record: &SystemRecord) -> Option<SystemNow> {
