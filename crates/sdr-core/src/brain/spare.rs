@@ -109,9 +109,10 @@ impl Brain {
         let faulty = self.staying(key).find(in_trouble);
         let only = self.current(key).filter(|_| !self.wants_spare(key));
         if let Some(id) = faulty.or(only) {
-            match cause {
-                Cause::Hung => self.kill(id),
-                _ => self.finish(id),
+            if cause == Cause::Hung {
+                self.kill(id);
+            } else {
+                self.finish(id);
             }
         }
     }
