@@ -118,6 +118,11 @@ struct Ground {
     stored: Option<StoredState>,
 }
 
+/// What other crates fill in for the brain.
+fn seams() -> Seams {
+    Seams { recovery: Box::new(sdr_recovery::make), allocation: Box::new(sdr_alloc::check) }
+}
+
 impl World {
     /// Makes everything. Call within a `LocalSet`.
     pub(crate) async fn start(robot: &RobotConfig) -> Result<(Box<Brain>, Self), StartError> {
@@ -139,8 +144,7 @@ impl World {
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
         let facts = brain_config.facts.clone();
         let installed = Installed::new(config::component_path(robot), facts, sender.clone());
-        let seams = Seams { recovery: Box::new(sdr_recovery::make) };
-        let brain = Brain::new(brain_config, seams, ground.stored, clock::now());
+        let brain = Brain::new(brain_config, seams(), ground.stored, clock::now());
 
         let outlets = Outlets {
             inputs: sender.clone(),

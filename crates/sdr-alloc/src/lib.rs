@@ -104,7 +104,7 @@ pub mod conformance;
 pub use best_score::BestScore;
 pub use explain::{homeless_line, placement_line};
 pub use first_fit::FirstFit;
-pub use outcome::allocate;
+pub use outcome::{allocate, check};
 pub use policy::{
     Bars, BatteryBar, IfUnknown, Millimetres, POLICY_VERSION, Policy, PolicyError, StartWith,
     Strategy, Unknown, Weight, Weights,

@@ -1,9 +1,10 @@
 //! From tries to a plan: the first that is whole, else the one that places most.
 
-use alloc::{string::String, vec::Vec};
+use alloc::{format, string::String, vec::Vec};
 
-use sdr_core::allocate::{
-    AllocError, Allocator, Homeless, Placement, Plan, Problem, Refusal, Tier,
+use sdr_core::{
+    allocate::{AllocError, Allocator, Homeless, Placement, Plan, Problem, Refusal, Tier},
+    spec::PolicyBytes,
 };
 
 use crate::{
@@ -24,6 +25,14 @@ pub fn allocate(problem: &Problem) -> Result<Plan, AllocError> {
         Strategy::FirstFit => FirstFit::new(policy).allocate(problem),
         Strategy::BestScore => BestScore::new(policy).allocate(problem),
     })
+}
+
+/// Whether a policy can be read here; the error is for people.
+pub fn check(policy: &PolicyBytes) -> Result<(), String> {
+    match Policy::decode(policy) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(format!("allocation policy `{}`: {error}", policy.name)),
+    }
 }
 
 /// The plan of one strategy.

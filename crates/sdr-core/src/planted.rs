@@ -52,12 +52,17 @@ pub enum Defect {
     NoWitness,
     /// A standby sends epochs that it never reserved on disk.
     EpochNotReserved,
+    /// A robot that lost its disk goes on with numbers it may have made before.
+    ForgottenReused,
+    /// A home that nobody hears goes on with what must not act alone.
+    LeaseNeverEnds,
+    /// A successor is chosen before the lease of the home is over.
+    LeaseNotAwaited,
 }
 
 impl Defect {
-    /// All that must be caught. [`Self::RoleTakenByAll`] is not among them: since terms and
-    /// offers order the claims, it breaks no rule in 200 seeds.
-    pub const ALL: [Self; 20] = [
+    /// All that must be caught.
+    pub const ALL: [Self; 24] = [
         Self::NoEpochCheck,
         Self::WireBeforeDisk,
         Self::TermNotStored,
@@ -67,6 +72,7 @@ impl Defect {
         Self::TombstoneDropped,
         Self::GoneIgnored,
         Self::RoleNeverTaken,
+        Self::RoleTakenByAll,
         Self::NoRepair,
         Self::UnwantedGoesOn,
         Self::NoRestart,
@@ -78,6 +84,9 @@ impl Defect {
         Self::StaleReports,
         Self::HomesNotStored,
         Self::SilentRoute,
+        Self::ForgottenReused,
+        Self::LeaseNeverEnds,
+        Self::LeaseNotAwaited,
     ];
 }
 

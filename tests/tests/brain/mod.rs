@@ -2,6 +2,7 @@
 
 mod again;
 mod deployment;
+mod policies;
 mod recovery;
 mod role;
 mod standby;

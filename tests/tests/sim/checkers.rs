@@ -83,8 +83,12 @@ fn what_a_robot_made_and_has_not_on_its_disk_is_seen() {
 
 #[test]
 fn two_coordinators_on_one_side_are_seen() {
-    let fleet = strangers();
+    let mut fleet = strangers();
     let mut coordinators = check::Coordinators::default();
+    // the record of a hand-over may be under way
+    assert_eq!(rule(&mut coordinators, &fleet, &Sight::Look), None);
+
+    fleet.run(Duration::from_secs(5));
     assert_eq!(rule(&mut coordinators, &fleet, &Sight::Look), Some("two-coordinators"));
 }
 

@@ -1,4 +1,5 @@
 //! Whole fleets in virtual time, under everything that can go wrong.
 
 mod checkers;
+mod histories;
 mod seeds;

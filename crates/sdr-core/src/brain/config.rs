@@ -61,10 +61,15 @@ impl BrainConfig {
 pub type MakeRecovery =
     Box<dyn Fn(&PolicyBytes) -> Result<Box<dyn Recovery + Send>, String> + Send>;
 
+/// Whether an allocation policy can be read here; the error is for people.
+pub type CheckAllocation = Box<dyn Fn(&PolicyBytes) -> Result<(), String> + Send>;
+
 /// What other crates fill in.
 pub struct Seams {
     /// Makes the recovery engine of a system from its policy.
     pub recovery: MakeRecovery,
+    /// Reads the allocation policy of a system.
+    pub allocation: CheckAllocation,
 }
 
 impl fmt::Debug for Seams {

@@ -70,7 +70,7 @@ impl Brain {
         if !self.has_witness() || !self.plans.is_due(&system.name, &purpose, now) {
             return false;
         }
-        let orphans = self.orphans(now, &system.name);
+        let orphans = self.missed_orphans(now, &system.name);
         let Some((_, reason)) = orphans.first() else { return false };
         let purpose = Purpose::Rehome { reason: reason.clone() };
         let avoid = self.avoid(now, system, &names_of(&orphans));

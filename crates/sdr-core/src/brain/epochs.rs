@@ -3,8 +3,14 @@
 //! Whoever stands by reserves a block of numbers while it gets ready. Whatever was reserved
 //! counts as used after a restart, so that (number, this robot) never names two choices.
 
+use alloc::string::ToString;
+
 use super::Brain;
-use crate::{id::ComponentKey, order::Epoch};
+use crate::{
+    id::ComponentKey,
+    order::Epoch,
+    record::{FleetKey, RecordKind},
+};
 
 /// Numbers reserved at a time.
 const BLOCK: u64 = 16;
@@ -35,7 +41,8 @@ impl Brain {
     /// The epoch that this robot mints after `before`.
     pub(super) fn next_epoch(&self, key: &ComponentKey, before: Option<&Epoch>) -> Epoch {
         let used = self.epochs.get(key).map_or(0, |book| book.last);
-        let number = before.map_or(0, |epoch| epoch.number).max(used).saturating_add(1);
+        let known = before.map_or(0, |epoch| epoch.number).max(used);
+        let number = self.number_after(RecordKind::ASSIGNMENT, &key.to_string(), known);
         Epoch { number, minted_by: self.me.clone() }
     }
 
@@ -43,8 +50,13 @@ impl Brain {
     pub(super) fn reserve_epochs(&mut self, key: &ComponentKey) {
         let present = self.wanted(key).and_then(|(version, _)| version.epoch.as_ref());
         let Some(present) = present.map(|epoch| epoch.number) else { return };
+        let used = self.epochs.get(key).map_or(0, |book| book.last);
+        let mut next = present.max(used);
+        if self.mesh.may_have_forgotten() {
+            // after a lost disk the next number lies a random way further on
+            next = self.number_after(RecordKind::ASSIGNMENT, &key.to_string(), next) - 1;
+        }
         let book = self.epochs.entry(key.clone()).or_default();
-        let next = present.max(book.last);
         if next + LEFT_MIN > book.reserved {
             book.reserved = next.saturating_add(BLOCK);
             self.desk.mark_urgent();
@@ -57,6 +69,7 @@ impl Brain {
     }
 
     pub(super) fn note_minted(&mut self, key: &ComponentKey, epoch: &Epoch) {
+        self.desk.note_made(FleetKey { kind: RecordKind::ASSIGNMENT, name: key.to_string() });
         if let Some(book) = self.epochs.get_mut(key) {
             book.last = book.last.max(epoch.number);
         }

@@ -1,18 +1,45 @@
 //! The coordinator's judgement of robots that are not heard any more.
 
-use alloc::{format, string::String, vec::Vec};
+use alloc::{collections::BTreeSet, format, string::String, vec::Vec};
 
 use super::Brain;
 use crate::{
     event::Event,
     id::{ComponentKey, Name, RobotId},
     planted::{self, Defect},
+    record::{FleetKey, FleetValue, RecordKind},
     recover::{Cause, Evidence, Fault, Remedy, RobotEvidence},
     time::{Duration, Instant},
     units::{Bytes, Permille},
 };
 
+/// Answers to a question about a home are waited for so long ...
+const ANSWERS_FOR: Duration = Duration::from_millis(250);
+/// ... and when nobody answered, it is asked again.
+const ASK_AGAIN: Duration = Duration::from_millis(400);
+/// Older answers are none.
+const ANSWERS_KEPT: Duration = Duration::from_secs(3);
+
+/// Who chose a home heard it: whoever learns of the choice gives the home so long to be heard
+/// here too, before it is judged by older news.
+const HOME_SPEAKS_WITHIN: Duration = Duration::from_secs(2);
+
 impl Brain {
+    /// Another robot chose a home.
+    pub(super) fn note_home(&mut self, now: Instant, key: &FleetKey) {
+        if key.kind != RecordKind::ASSIGNMENT {
+            return;
+        }
+        let Some((record, value)) = self.mesh.fleet().entry(key) else { return };
+        if let FleetValue::Assignment(assignment) = value
+            && record.version.author != self.me
+            && !self.mesh.is_alive(&assignment.home)
+        {
+            self.homes_told.retain(|_, until| now < *until);
+            self.homes_told.insert(assignment.component.clone(), now + HOME_SPEAKS_WITHIN);
+        }
+    }
+
     pub(super) fn note_gone(&mut self, now: Instant, robot: &RobotId) {
         let age = self.mesh.age(robot, now).unwrap_or(Duration::ZERO);
         let text = format!("no fresh news of {robot} for {} ms", age.as_millis());
@@ -30,15 +57,56 @@ impl Brain {
         !self.mesh.is_alive(robot) && (waited || self.mesh.age(robot, now).is_some())
     }
 
+    /// Whether a home that somebody else chose lately still has time to speak.
+    fn is_just_told(&self, component: &ComponentKey, now: Instant) -> bool {
+        self.homes_told.get(component).is_some_and(|until| now < *until)
+    }
+
+    /// Rule 3: whether others were asked, and none has fresher news of this home.
+    fn is_missed_by_all(&mut self, now: Instant, home: &RobotId) -> bool {
+        if self.mesh.alive().next().is_none() {
+            return true;
+        }
+        let inquiry = self.mesh.inquiry(home);
+        let inquiry = inquiry.filter(|one| now.since(one.asked_at) < ANSWERS_KEPT);
+        let waited = inquiry.map(|one| now.since(one.asked_at));
+        let answered = inquiry.map_or(0, |one| one.answered);
+        let all = inquiry.is_some_and(|one| one.answered >= one.asked);
+        if answered > 0 && (all || waited >= Some(ANSWERS_FOR)) {
+            return true;
+        }
+        if waited.is_none_or(|waited| waited >= ASK_AGAIN) {
+            self.mesh.ask_about(now, home);
+        }
+        self.look_at = self.look_at.min(now + ANSWERS_FOR);
+        false
+    }
+
+    /// Orphans whose homes others miss, too.
+    pub(super) fn missed_orphans(
+        &mut self,
+        now: Instant,
+        system: &Name,
+    ) -> Vec<(ComponentKey, String)> {
+        let mut orphans = self.orphans(now, system);
+        let homes: BTreeSet<RobotId> =
+            orphans.iter().filter_map(|(key, _)| self.home(key).cloned()).collect();
+        let missed: BTreeSet<RobotId> =
+            homes.into_iter().filter(|home| self.is_missed_by_all(now, home)).collect();
+        orphans.retain(|(key, _)| self.home(key).is_some_and(|home| missed.contains(home)));
+        orphans
+    }
+
     /// Components of `system` whose home is gone and which its policy wants elsewhere.
-    pub(super) fn orphans(&self, now: Instant, system: &Name) -> Vec<(ComponentKey, String)> {
+    fn orphans(&self, now: Instant, system: &Name) -> Vec<(ComponentKey, String)> {
         let Some(running) = self.systems.get(system) else { return Vec::new() };
         let mut evidence = Vec::new();
         for spec in &running.components {
             let component = running.key(&spec.name);
             let Some(home) = self.home(&component) else { continue };
+            let gone = self.is_gone(home, now) && !self.is_just_told(&component, now);
             let free = self.lease_is_over(now, home, spec);
-            if !self.is_gone(home, now) || !free || !self.succession_is_over(now, &component) {
+            if !gone || !free || !self.succession_is_over(now, &component) {
                 continue;
             }
             let reason = format!("{home} is not heard any more");

@@ -7,6 +7,7 @@ use alloc::format;
 use super::Brain;
 use crate::{
     id::{ComponentKey, RobotId},
+    planted::{self, Defect},
     spec::{ComponentSpec, IsolationAction},
     time::{Duration, Instant},
 };
@@ -15,6 +16,10 @@ use crate::{
 const ASKS_PER_LEASE: u32 = 3;
 /// Fastest asking.
 const ASK_EVERY_MIN: Duration = Duration::from_millis(300);
+/// A question that nobody answered is asked again.
+const ASK_AGAIN: Duration = Duration::from_millis(400);
+/// Answers are looked for so long after the question.
+const ANSWERS_AFTER: [Duration; 2] = [Duration::from_millis(60), Duration::from_millis(200)];
 /// After isolation, signs must have come for so long: a new home may have been chosen.
 const REGAIN: Duration = Duration::from_secs(2);
 /// A successor waits so much longer than the lease: clocks drift, timers are late.
@@ -31,6 +36,24 @@ pub(super) struct Lease {
     pub(super) wake_at: Option<Instant>,
 }
 
+impl Lease {
+    fn is_answered(&self) -> bool {
+        self.asked_at.is_some() && self.acked_at >= self.asked_at
+    }
+
+    /// From one question to the next.
+    fn pause(&self, after: Duration) -> Duration {
+        let every = (after / ASKS_PER_LEASE).max(ASK_EVERY_MIN);
+        if self.is_answered() { every } else { every.min(ASK_AGAIN) }
+    }
+
+    /// When to look for answers: a home that waits for its first sign should not wait longer.
+    fn answers_at(&self) -> impl Iterator<Item = Instant> + use<> {
+        let asked_at = self.asked_at.filter(|_| !self.is_answered());
+        asked_at.into_iter().flat_map(|at| ANSWERS_AFTER.map(|after| at + after))
+    }
+}
+
 impl Brain {
     /// Asks for signs while a component here depends on them.
     pub(super) fn keep_lease(&mut self, now: Instant) {
@@ -40,17 +63,18 @@ impl Brain {
             return;
         };
         self.take_sign(now, after);
-        let every = (after / ASKS_PER_LEASE).max(ASK_EVERY_MIN);
-        let due = self.lease.asked_at.map_or(now, |at| at + every);
+        let pause = self.lease.pause(after);
+        let due = self.lease.asked_at.map_or(now, |at| at + pause);
         if now >= due {
             self.lease.asked_at = Some(now);
             let me = self.me.clone();
             self.mesh.ask_about(now, &me);
         }
-        let next = self.lease.asked_at.map_or(now, |at| at + every);
+        let next = self.lease.asked_at.map_or(now, |at| at + self.lease.pause(after));
+        let answers = self.lease.answers_at();
         let ends = self.lease.acked_at.map(|at| at + after);
         let regained = self.lease.since.map(|at| at + REGAIN);
-        let ahead = ends.into_iter().chain(regained).filter(|at| *at > now);
+        let ahead = ends.into_iter().chain(regained).chain(answers).filter(|at| *at > now);
         self.lease.wake_at = ahead.chain([next]).min();
     }
 
@@ -83,7 +107,8 @@ impl Brain {
         let Some(after) = self.leased_for(key).filter(|_| !self.is_only_robot()) else {
             return true;
         };
-        let acked = self.lease.acked_at.is_some_and(|at| now < at + after);
+        let acked = self.lease.acked_at.is_some_and(|at| now < at + after)
+            || planted::is(Defect::LeaseNeverEnds);
         // the first sign after an isolation is not enough
         let lasting = self.lease.since.is_none_or(|at| now >= at + REGAIN);
         let acts = self.current(key).is_some_and(|id| self.instances[&id].is_told_to_act());
@@ -108,7 +133,9 @@ impl Brain {
 
     /// Whether a home has been silent for so long that its lease is over for certain.
     pub(super) fn lease_is_over(&self, now: Instant, home: &RobotId, spec: &ComponentSpec) -> bool {
-        let Some(after) = leased_for(spec) else { return true };
+        let Some(after) = leased_for(spec).filter(|_| !planted::is(Defect::LeaseNotAwaited)) else {
+            return true;
+        };
         let silent = self.mesh.age(home, now).unwrap_or_else(|| now.since(self.started_at));
         silent >= after + MARGIN
     }

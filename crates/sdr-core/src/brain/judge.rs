@@ -88,20 +88,15 @@ impl Brain {
         if self.engines.get(name).is_some_and(|engine| engine.policy == policy) {
             return true;
         }
-        match (self.seams.recovery)(&policy) {
-            Ok(recovery) => {
-                self.engines.insert(name.clone(), Engine { policy, recovery });
-                true
-            }
-            Err(error) => {
-                let text = format!("recovery `{}`: {error}", policy.name);
-                let told = self.unreadable.insert(name.clone(), policy);
-                if told.as_ref() != self.unreadable.get(name) {
-                    self.event("policy-unreadable", text);
-                }
-                false
+        let Some((recovery, unread)) = self.readable_recovery(&policy) else { return false };
+        if let Some(error) = unread {
+            let told = self.unreadable.insert(name.clone(), policy.clone());
+            if told.as_ref() != Some(&policy) {
+                self.event("policy-unreadable", format!("{error}; the default goes for {name}"));
             }
         }
+        self.engines.insert(name.clone(), Engine { policy, recovery });
+        true
     }
 
     /// Keeps one engine for each policy in use.
@@ -118,7 +113,7 @@ impl Brain {
     }
 
     pub(super) fn make_engine(&self, policy: &PolicyBytes) -> Option<Engine> {
-        let recovery = (self.seams.recovery)(policy).ok()?;
+        let (recovery, _) = self.readable_recovery(policy)?;
         Some(Engine { policy: policy.clone(), recovery })
     }
 

@@ -15,8 +15,9 @@ use crate::{
     time::Instant,
 };
 
-/// Activations of one component within one life of an agent: one each five seconds for a day.
-const RUNS_PER_LIFE: u64 = 1 << 14;
+/// Lives are so many runs apart. What the disk remembers goes on behind it in any case; a life
+/// after a lost disk begins many lives further on.
+const RUNS_PER_LIFE: u64 = 1 << 8;
 
 impl Brain {
     /// Starts a process unless something speaks against it for now.

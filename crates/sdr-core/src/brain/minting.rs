@@ -1,6 +1,11 @@
 //! Disk before wire: what this robot makes is stored before anybody hears of it.
 
-use alloc::{collections::BTreeMap, format, string::String, vec::Vec};
+use alloc::{
+    collections::{BTreeMap, BTreeSet},
+    format,
+    string::String,
+    vec::Vec,
+};
 
 use super::Brain;
 use crate::{
@@ -11,7 +16,7 @@ use crate::{
     mesh::FleetRecord,
     order::Run,
     planted::{self, Defect},
-    record::RecordKind,
+    record::{FleetKey, RecordKind},
     time::{Duration, Instant},
 };
 
@@ -36,6 +41,8 @@ pub(super) struct Desk {
     in_flight: Option<StoreTicket>,
     dirty: bool,
     mints: Vec<Mint>,
+    /// What this life made something of, at most as many as the table holds.
+    made: BTreeSet<FleetKey>,
     runs_in_flight: BTreeMap<ComponentKey, Run>,
     epochs_in_flight: BTreeMap<ComponentKey, u64>,
     spoken: bool,
@@ -81,6 +88,15 @@ impl Desk {
         own.map(|record| record.version.revision).max()
     }
 
+    /// Whether this life made something of what stands under `key`.
+    pub(super) fn made(&self, key: &FleetKey) -> bool {
+        self.made.contains(key)
+    }
+
+    pub(super) fn note_made(&mut self, key: FleetKey) {
+        self.made.insert(key);
+    }
+
     /// When to try a broken disk again.
     pub(super) fn retry_at(&self) -> Option<Instant> {
         self.broken_at.map(|at| at + DISK_RETRY)
@@ -102,6 +118,7 @@ impl Brain {
         if planted::is(Defect::WireBeforeDisk) {
             self.mesh.publish(records.clone());
         }
+        self.desk.made.extend(records.iter().map(|record| record.key.clone()));
         let ticket = self.desk.last + 1;
         self.desk.mints.push(Mint { ticket, records, answer });
         self.store_now();

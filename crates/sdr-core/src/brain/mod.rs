@@ -31,6 +31,7 @@ mod moves;
 mod newborn;
 mod news;
 mod plans;
+mod policies;
 mod prepare;
 mod problem;
 mod reconcile;
@@ -54,7 +55,7 @@ use alloc::{
     sync::Arc,
 };
 
-pub use config::{BrainConfig, MakeRecovery, Seams};
+pub use config::{BrainConfig, CheckAllocation, MakeRecovery, Seams};
 
 use crate::{
     allocate::Refusal,
@@ -147,6 +148,8 @@ pub struct Brain {
     plans: PlanDesk,
     moves: BTreeMap<ComponentKey, MoveWatch>,
     left: BTreeMap<(ComponentKey, RobotId), Instant>,
+    /// Homes that others chose lately: until when they have time to speak.
+    homes_told: BTreeMap<ComponentKey, Instant>,
     desk: Desk,
     desk_of_role: RoleDesk,
     lease: Lease,
@@ -223,6 +226,7 @@ impl Brain {
             plans: PlanDesk::default(),
             moves: BTreeMap::new(),
             left: BTreeMap::new(),
+            homes_told: BTreeMap::new(),
             desk: Desk::default(),
             desk_of_role: RoleDesk::default(),
             lease: Lease::default(),
@@ -298,6 +302,11 @@ impl Brain {
     /// What this robot believes of the fleet, for the API.
     pub fn status(&self, now: Instant) -> StatusView {
         self.status_view(now)
+    }
+
+    /// Whether this robot decides for others now: it holds the role, and hears somebody.
+    pub fn coordinates(&self) -> bool {
+        self.is_coordinator()
     }
 
     /// What this robot knows of the fleet, to look at.

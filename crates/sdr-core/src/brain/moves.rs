@@ -205,7 +205,7 @@ impl Brain {
             self.moves.remove(key);
             let Some((version, assignment)) = self.wanted(key) else { continue };
             let value = Assignment { target: None, ..assignment.clone() };
-            records.push(record(key, self.next_revision(version), value));
+            records.push(record(key, self.next_revision(key, version), value));
         }
         self.mint(records, None);
     }
@@ -285,13 +285,15 @@ impl Brain {
         let (version, assignment) = self.wanted(key)?;
         let (target, reason) = (Some(target.clone()), reason.into());
         let value = Assignment { target, reason, ..assignment.clone() };
-        Some(record(key, self.next_revision(version), value))
+        Some(record(key, self.next_revision(key, version), value))
     }
 
     /// The version of a change that chooses no new home.
-    pub(super) fn next_revision(&self, version: &Version) -> Version {
-        let (revision, term) = (version.revision + 1, self.term());
-        Version { revision, term, author: self.me.clone(), ..version.clone() }
+    pub(super) fn next_revision(&self, key: &ComponentKey, version: &Version) -> Version {
+        let name = key.to_string();
+        let revision = self.number_after(RecordKind::ASSIGNMENT, &name, version.revision);
+        let (term, author) = (self.term(), self.me.clone());
+        Version { revision, term, author, ..version.clone() }
     }
 
     pub(super) fn move_deadlines(&self) -> impl Iterator<Item = Instant> {

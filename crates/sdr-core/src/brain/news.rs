@@ -22,6 +22,7 @@ impl Brain {
                 MeshNews::Record(key) => {
                     self.desk.mark_dirty();
                     self.stir = Stir::ALL;
+                    self.note_home(now, &key);
                     changed.note(&key);
                 }
                 MeshNews::Alive(robot) => {

@@ -59,7 +59,7 @@ impl Brain {
         let settled = system.components.iter().filter(|spec| !names.contains(&spec.name));
         Problem {
             tier,
-            policy: system.allocation.clone(),
+            policy: self.readable_allocation(system),
             receiver: system.receiver.clone(),
             robots: robots.iter().filter_map(|robot| self.offer(robot, &leaving)).collect(),
             items,

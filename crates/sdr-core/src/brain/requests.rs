@@ -19,13 +19,13 @@ use crate::{
     spec::SystemSpec,
 };
 
-/// More revisions of one system than anybody has deployed.
-const FORGOTTEN_REVISIONS: u64 = 1000;
-
 impl Brain {
     pub(super) fn handle_deploy(&mut self, request: RequestId, system: SystemSpec) {
         if let Err(error) = system.check() {
             return self.refuse(request, error.to_string());
+        }
+        if let Some(objection) = self.objection_to_policies(&system) {
+            return self.refuse(request, objection);
         }
         if self.desk.is_broken() {
             return self.refuse(request, format!("{} cannot write to its disk", self.me));
@@ -49,7 +49,10 @@ impl Brain {
                         && now.connections.len() == system.connections.len()
                 })
             });
-        let revision = before.unwrap_or_else(|| self.revisions_unseen()) + u64::from(!unchanged);
+        let revision = match before {
+            Some(revision) if unchanged => revision,
+            Some(_) | None => self.next_revision_of(&name, before),
+        };
         let answer = DeployAnswer { system: name.to_string(), revision, changed: !unchanged };
         let answer = Accepted::System(answer);
         if unchanged {
@@ -79,7 +82,7 @@ impl Brain {
             let text = format!("no system `{name}` is deployed; deployed: [{}]", known.join(", "));
             return self.refuse(request, text);
         };
-        let revision = revision + 1;
+        let revision = self.next_revision_of(name, Some(revision));
         let value = FleetValue::System(SystemRecord {
             name: name.clone(),
             receiver: self.me.clone(),
@@ -102,11 +105,8 @@ impl Brain {
         self.effects.push_back(Effect::Answer { request, result: Err(reason) });
     }
 
-    /// Who compared with nobody since its disk was empty may have forgotten revisions that
-    /// others hold: what it is told now must not be taken for one of them.
-    fn revisions_unseen(&self) -> u64 {
-        let compared = self.mesh.is_in_step() || self.is_only_robot();
-        if compared { 0 } else { FORGOTTEN_REVISIONS }
+    fn next_revision_of(&self, system: &Name, before: Option<u64>) -> u64 {
+        self.number_after(RecordKind::SYSTEM, system.as_str(), before.unwrap_or(0))
     }
 
     fn system_revision(&self, name: &Name) -> Option<u64> {

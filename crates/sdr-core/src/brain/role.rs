@@ -21,6 +21,9 @@ const HEARD_WITHIN: Duration = Duration::from_millis(2500);
 
 /// A free role is looked at so often.
 const STAND_EVERY: Duration = Duration::from_millis(100);
+/// Each robot sees the others' links otherwise than they do: when those before it in line do
+/// not take a free role, a robot does after so long for each of them.
+const STAND_STAGGER: Duration = Duration::from_secs(2);
 
 /// What this robot remembers of the role beside the record.
 #[derive(Clone, Debug, Default)]
@@ -31,6 +34,8 @@ pub(super) struct RoleDesk {
     pub(super) suspended: bool,
     pub(super) wake_at: Option<Instant>,
     pub(super) stood_at: Option<Instant>,
+    /// Since when it could take a role that nobody holds.
+    pub(super) free_since: Option<Instant>,
     /// Why this robot takes the role, until it is on disk and said.
     pub(super) why: String,
 }
@@ -75,7 +80,11 @@ impl Brain {
         }
         self.desk_of_role.stood_at = Some(now);
         self.wake_for_role(now + STAND_EVERY);
-        if self.may_stand(now) && self.has_witness() && self.is_first_choice() {
+        if !self.may_stand(now) || !self.has_witness() {
+            return;
+        }
+        let since = *self.desk_of_role.free_since.get_or_insert(now);
+        if self.is_first_choice() || now >= since + STAND_STAGGER * self.place_in_line() {
             let text = format!("fittest of {}", self.alive_robots().len());
             self.take_role(&text);
         }
@@ -98,7 +107,7 @@ impl Brain {
 
     /// The role for `holder` under the next term.
     pub(super) fn role_record(&self, holder: &RobotId, by_operator: bool) -> FleetRecord {
-        let term = self.term() + 1;
+        let term = self.number_after(RecordKind::ROLE, "", self.term());
         let fitness = self.fitness(holder).points;
         let value =
             FleetValue::Role(RoleRecord { holder: holder.clone(), term, fitness, by_operator });

@@ -25,7 +25,6 @@ impl Brain {
         if let Some(refusal) = self.objection_to_holder(to) {
             return self.refuse(request, refusal);
         }
-        let term = self.term() + 1;
         let answer = |term, changed| {
             Accepted::Role(RoleAnswer { holder: Some(to.to_string()), term, changed })
         };
@@ -35,6 +34,7 @@ impl Brain {
             return;
         }
         let record = self.role_record(to, true);
+        let term = record.version.term;
         let event = Event::new("role-moved", &self.me, format!("term {term}, to {to} by hand"));
         self.push_event(event.number("term", count(term)));
         self.mint(vec![record], Some((request, answer(term, true))));
@@ -73,7 +73,8 @@ impl Brain {
             self.effects.push_back(Effect::Answer { request, result: Ok(answer) });
             return;
         }
-        let (name, revision) = (policy.name.clone(), revision + 1);
+        let name = policy.name.clone();
+        let revision = self.number_after(RecordKind::ROLE_POLICY, "", revision);
         let value = FleetValue::RolePolicy(policy);
         let version = Version { epoch: None, revision, term: 0, author: self.me.clone() };
         let record = FleetRecord::new(RecordKind::ROLE_POLICY, String::new(), version, &value);

@@ -172,7 +172,7 @@ impl Brain {
             let proper = self.proper_standbys(now, key, assignment);
             if proper != assignment.standbys {
                 let value = Assignment { standbys: proper, ..assignment.clone() };
-                records.push(record(key, self.next_revision(version), value));
+                records.push(record(key, self.next_revision(key, version), value));
             }
         }
         self.mint_some(records)
@@ -251,7 +251,7 @@ impl Brain {
             let Some((version, assignment)) = self.wanted(key) else { continue };
             let mut value = assignment.clone();
             value.standbys.push(placement.robot.clone());
-            records.push(record(key, self.next_revision(version), value));
+            records.push(record(key, self.next_revision(key, version), value));
             let text = format!("on {}: {}", placement.robot, placed_reason(asked, placement));
             self.event_about("standby-placed", key, text);
         }

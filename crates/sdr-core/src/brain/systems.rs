@@ -20,6 +20,8 @@ use crate::{
 #[derive(Clone, Debug)]
 pub(super) struct SystemNow {
     pub(super) name: Name,
+    /// Of its record and of all its parts.
+    pub(super) version: Version,
     pub(super) revision: u64,
     /// Homes chosen before this revision are void.
     pub(super) since: u64,
@@ -108,13 +110,13 @@ impl Brain {
         };
         let wanted = record.wanted;
         let name = record.name.clone();
-        let whole = wanted.then(|| self.assemble(version.revision, record)).flatten();
+        let whole = wanted.then(|| self.assemble(version, record)).flatten();
         let before = self.systems.get(&name).cloned();
         if wanted && whole.is_none() {
             return;
         }
         let redeployed = matches!(
-            (&before, &whole), (Some(old), Some(new)) if old.revision != new.revision
+            (&before, &whole), (Some(old), Some(new)) if old.version != new.version
         );
         let new = whole.map(Arc::new);
         keys.extend(before.iter().chain(&new).flat_map(|s| s.keys().collect::<Vec<_>>()));
@@ -140,12 +142,11 @@ impl Brain {
         self.judge_due = true;
     }
 
-    fn assemble(&self, revision: u64, record: &SystemRecord) -> Option<SystemNow> {
+    fn assemble(&self, of: &Version, record: &SystemRecord) -> Option<SystemNow> {
         let fleet = self.mesh.fleet();
         let prefix = format!("{}/", record.name);
-        let current = |key: &FleetKey, version: &Version| {
-            key.name.starts_with(&prefix) && version.revision == revision
-        };
+        let current =
+            |key: &FleetKey, version: &Version| key.name.starts_with(&prefix) && version == of;
         let mut components = Vec::new();
         for (key, version, value) in fleet.below(RecordKind::COMPONENT, &prefix) {
             if let (true, FleetValue::Component(spec)) = (current(key, version), value) {
@@ -160,7 +161,7 @@ impl Brain {
         }
         let policy = |kind| match fleet.get(kind, record.name.as_str()) {
             Some((version, FleetValue::Allocation(policy) | FleetValue::Recovery(policy)))
-                if version.revision == revision =>
+                if version == of =>
             {
                 Some(policy.clone())
             }
@@ -175,7 +176,8 @@ impl Brain {
         connections.sort_by_key(|connection| connection.index);
         Some(SystemNow {
             name: record.name.clone(),
-            revision,
+            version: of.clone(),
+            revision: of.revision,
             since: record.since,
             receiver: record.receiver.clone(),
             components,

@@ -121,7 +121,7 @@ impl Brain {
     }
 
     /// How many are to try before this robot: as the holder named them, then by fitness.
-    fn place_in_line(&self) -> u32 {
+    pub(super) fn place_in_line(&self) -> u32 {
         let named = self.succession().map(|said| said.order.clone()).unwrap_or_default();
         let place = match named.iter().position(|robot| *robot == self.me) {
             Some(place) => place,

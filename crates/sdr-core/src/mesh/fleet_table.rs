@@ -127,7 +127,7 @@ impl FleetTable {
             Some(_) | None => {}
         }
         let system = match &value {
-            FleetValue::System(_) => Some((record.key.name.clone(), record.version.revision)),
+            FleetValue::System(_) => Some((record.key.name.clone(), record.version.clone())),
             FleetValue::Component(_)
             | FleetValue::Connection(_)
             | FleetValue::Allocation(_)
@@ -141,8 +141,8 @@ impl FleetTable {
         if planted::is(Defect::TombstoneDropped) {
             self.drop_tombstones();
         }
-        if let Some((name, revision)) = system {
-            self.drop_parts_before(&name, revision);
+        if let Some((name, version)) = system {
+            self.drop_parts_before(&name, &version);
         }
         Merge::News
     }
@@ -151,6 +151,11 @@ impl FleetTable {
     pub fn get(&self, kind: RecordKind, name: &str) -> Option<(&Version, &FleetValue)> {
         let key = FleetKey { kind, name: String::from(name) };
         self.records.get(&key).map(|(record, value)| (&record.version, value))
+    }
+
+    /// The record under a key, and its value.
+    pub fn entry(&self, key: &FleetKey) -> Option<&(FleetRecord, FleetValue)> {
+        self.records.get(key)
     }
 
     /// The record under a key.
@@ -165,6 +170,11 @@ impl FleetTable {
             self.record(&FleetKey { kind: RecordKind::SYSTEM, name })
         };
         self.record(key).or_else(system)
+    }
+
+    /// All records, by key.
+    pub fn records(&self) -> impl Iterator<Item = (&FleetRecord, &FleetValue)> {
+        self.records.values().map(|(record, value)| (record, value))
     }
 
     /// All values of a kind, by name.
@@ -301,14 +311,14 @@ impl FleetTable {
         }
     }
 
-    /// Whether a greater revision of its system is known.
+    /// Whether a greater version of its system is known. Two operators may give a system the
+    /// same revision on two robots: parts of the lesser author's are outdated too.
     fn is_outdated(&self, record: &FleetRecord) -> bool {
         let Some(system) = system_of_part(&record.key) else { return false };
-        self.get(RecordKind::SYSTEM, system)
-            .is_some_and(|(version, _)| version.revision > record.version.revision)
+        self.get(RecordKind::SYSTEM, system).is_some_and(|(version, _)| *version > record.version)
     }
 
-    fn drop_parts_before(&mut self, system: &str, revision: u64) {
+    fn drop_parts_before(&mut self, system: &str, version: &Version) {
         let kinds = [
             RecordKind::COMPONENT,
             RecordKind::CONNECTION,
@@ -323,7 +333,7 @@ impl FleetTable {
                 .range(from..)
                 .take_while(|(key, _)| key.kind == kind && key.name.starts_with(system));
             let old = parts.filter(|(key, (record, _))| {
-                system_of_part(key) == Some(system) && record.version.revision < revision
+                system_of_part(key) == Some(system) && record.version < *version
             });
             outdated.extend(old.map(|(key, _)| key.clone()));
         }

@@ -72,6 +72,11 @@ impl Links {
         }
     }
 
+    /// Whether `seat` said that it heard this robot.
+    pub(super) fn is_echoed(&self, seat: Seat) -> bool {
+        self.links.get(&seat).is_some_and(|link| link.echoed.is_some())
+    }
+
     /// This robot was paused or deaf: what is under way proves nothing.
     pub(super) fn forgive(&mut self) {
         for link in self.links.values_mut() {

@@ -24,6 +24,7 @@ mod fleet_tree;
 mod inquiry;
 mod links;
 mod liveness;
+mod lives;
 mod news;
 mod outbox;
 mod peers;
@@ -45,6 +46,7 @@ pub use author::{Author, AuthorKey, Incarnation};
 pub use author_table::AuthorTable;
 pub use fleet_table::{FleetRecord, FleetTable, Merge};
 pub use liveness::Standing;
+pub use lives::Memory;
 pub use news::{Inquiry, MeshConfig, MeshCounters, MeshNews, MeshTraffic, Push};
 pub use wire::{
     AskNews, AskStamps, AuthorDelta, Beat, Beats, DATAGRAM_BYTES_MAX, Datagram, Echo, FleetEntries,
@@ -63,6 +65,7 @@ use author_table::{Admission, Seat};
 use inquiry::Inquiries;
 use links::Links;
 use liveness::Liveness;
+use lives::Newborn;
 use peers::Peers;
 use repair::Repair;
 pub use round::BeatsFor;
@@ -86,6 +89,7 @@ pub struct Mesh {
     late_until: Instant,
     late_by: Duration,
     in_step: bool,
+    newborn: Newborn,
     authors: AuthorTable,
     fleet: FleetTable,
     liveness: Liveness,
@@ -136,6 +140,7 @@ impl Mesh {
             late_until: now,
             late_by: Duration::ZERO,
             in_step: false,
+            newborn: Newborn::default(),
             fleet,
             outbox: VecDeque::new(),
             news: VecDeque::new(),
@@ -177,6 +182,7 @@ impl Mesh {
         }
         self.spread_due();
         self.compare_on();
+        self.hail_seeds();
         self.beat_guards();
         self.judge();
     }
@@ -230,14 +236,6 @@ impl Mesh {
         self.guard.set(purpose, beats, self.clock);
     }
 
-    /// Begins the first life of a robot that nobody corrected while it spoke as newborn
-    /// (counter 0), the one after `lives` that it cannot remember.
-    pub fn grow_up(&mut self, lives: u64) {
-        if self.own.counter == 0 {
-            self.begin_first_life(lives);
-        }
-    }
-
     /// Asks up to four living robots for fresh news of `robot`; what they know becomes part
     /// of this robot's judgement as it arrives.
     pub fn ask_about(&mut self, now: Instant, robot: &RobotId) {
@@ -262,7 +260,7 @@ impl Mesh {
     pub fn next_deadline(&self) -> Instant {
         let others = self.liveness.next_deadline().into_iter();
         let others = others.chain(self.spread.next_deadline()).chain(self.guard.next_deadline());
-        let others = others.chain(self.repair.next_deadline());
+        let others = others.chain(self.repair.next_deadline()).chain(self.hail_at());
         others.fold(self.round_at, Instant::min)
     }
 

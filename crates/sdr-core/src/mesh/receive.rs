@@ -5,7 +5,7 @@ use core::{net::SocketAddr, time::Duration};
 use alloc::vec::Vec;
 
 use super::{
-    Beats, Datagram, Header, Incarnation, Mesh, MeshNews, Section, Standing,
+    Beats, Datagram, Header, Mesh, MeshNews, Section, Standing,
     author_table::{Admission, Lookup, Seat},
     liveness::Heard,
 };
@@ -27,28 +27,13 @@ impl Mesh {
     /// A datagram under this robot's own name: an echo, an old life, or a twin.
     pub(super) fn handle_own_name(&mut self, from: SocketAddr, header: &Header) {
         if header.incarnation == self.own {
-            return;
+            return self.meet_self(from);
         }
         self.counters.stale += 1;
         if header.incarnation > self.own {
             self.outgrow(header.incarnation);
             self.news.push_back(MeshNews::DuplicateId(from));
         }
-    }
-
-    /// Speaks under a greater incarnation than `seen`, which others hold of this robot.
-    pub(super) fn outgrow(&mut self, seen: Incarnation) {
-        self.own.counter = seen.counter.saturating_add(1);
-        self.authors.reincarnate(self.own);
-        self.spread.say_anew();
-        self.told.introduce(Seat::OWN);
-        // under the new life others know nothing of it
-        self.push_own();
-    }
-
-    /// Nobody knew this robot from before: its first life begins.
-    pub(super) fn begin_first_life(&mut self, after: u64) {
-        self.outgrow(Incarnation { counter: after, nonce: self.own.nonce });
     }
 
     pub(super) fn take_in(&mut self, from: SocketAddr, datagram: Datagram) {
@@ -100,8 +85,8 @@ impl Mesh {
     ) {
         match section {
             Section::Link(mark) => self.links.take(seat, mark, self.clock),
-            // the header and the link's mark are the answer
-            Section::Ping => answer.push(Section::Beats(Beats { wide: false, beats: Vec::new() })),
+            // the header and the link's mark are the answer; who is new wants to compare, too
+            Section::Ping => answer.push(self.summary()),
             Section::Beats(beats) => self.take_beats(from, &beats),
             Section::Summary(summary) => self.compare(from, summary, answer),
             Section::Stamps(stamps) => stamps.into_iter().for_each(|stamp| self.take_stamp(stamp)),

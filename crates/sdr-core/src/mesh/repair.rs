@@ -174,6 +174,7 @@ impl Mesh {
         let root = self.fleet.tree().root();
         if theirs.fleet == root || planted::is(Defect::NoRepair) {
             self.in_step = true;
+            self.meet(from);
             self.repair.unfinished = false;
             self.repair.session = self.repair.session.filter(|session| session.with != from);
         } else if self.may_compare() {

@@ -166,9 +166,13 @@ impl Mesh {
 
     /// What every greeting holds: signs of life and hashes.
     pub(super) fn greeting(&mut self, to: Seat) -> Vec<Section> {
-        let beats = Section::Beats(self.beats_for(to));
-        let summary = Summary { fleet: self.fleet.tree().root(), roster: self.authors.hash() };
-        vec![beats, Section::Summary(summary)]
+        vec![Section::Beats(self.beats_for(to)), self.summary()]
+    }
+
+    /// Hashes of what this robot holds.
+    pub(super) fn summary(&self) -> Section {
+        let roster = self.authors.hash();
+        Section::Summary(Summary { fleet: self.fleet.tree().root(), roster })
     }
 
     fn greet(&mut self, seat: Seat) {

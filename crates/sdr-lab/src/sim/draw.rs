@@ -2,14 +2,10 @@
 
 use std::time::Duration;
 
-use sdr_core::{
-    recover::Cause,
-    spec::SystemSpec,
-    units::{Bytes, Permille},
-};
+use sdr_core::recover::Cause;
 
 use super::{
-    Behaviour, Chance, ClockFate, DiskFate, Fault, Incident, Setup, Way, Weather, systems,
+    Behaviour, Chance, ClockFate, DiskFate, Fault, Incident, Setup, Way, Weather, edition, systems,
 };
 
 /// Faults of a component's own, at most: its ladder must not end in `hold`.
@@ -38,7 +34,7 @@ impl Scenario {
     /// Everything that `seed` draws.
     pub fn draw(seed: u64) -> Self {
         let mut chance = Chance::stream(seed, 10);
-        let robots = chance.between(3, 8);
+        let robots = if chance.happens(0.06) { 2 } else { chance.between(3, 8) };
         let calm_after = chance.time(Duration::from_secs(35), Duration::from_secs(80));
         let mut scenario = Self {
             seed,
@@ -125,7 +121,10 @@ impl Draw {
                 return incidents;
             }
             let left = self.calm_after - after;
-            incidents.push(Incident { after, fault: self.fault(systems, left) });
+            let fault = self.fault(systems, left);
+            let worse = self.worse(&fault, left);
+            incidents.push(Incident { after, fault });
+            incidents.extend(worse.map(|(later, fault)| Incident { after: after + later, fault }));
         }
     }
 
@@ -146,7 +145,7 @@ impl Draw {
 
     fn fault(&mut self, systems: usize, left: Duration) -> Fault {
         let robot = self.chance.below(self.robots);
-        match self.chance.below(30) {
+        match self.chance.below(34) {
             0..=3 => self.crash(robot, left),
             4..=5 => Fault::CrashAtStore { robot, down: self.time(100, 8000, left) },
             6..=8 => self.pause(robot, left),
@@ -165,12 +164,28 @@ impl Draw {
             }
             22..=24 if self.kills < KILLS_MAX => self.component(robot, systems, left),
             25 => Fault::Fade { robot, level_dbm: -84, time: self.time(8000, 20_000, left) },
-            26 => Fault::Undeploy { robot, system: self.system_name(systems) },
+            26..=27 => Fault::Undeploy { robot, system: self.system_name(systems) },
+            28 => Fault::MoveRole { robot, to: self.chance.below(self.robots) },
+            29 => {
+                let policy = Box::new(edition::role_policy(&mut self.chance, self.robots));
+                Fault::RolePolicy { robot, policy }
+            }
             _ => {
                 let system = self.chance.below(systems);
                 self.deploy(system)
             }
         }
+    }
+
+    /// A full disk often meets a start, or power that fails while nothing can be written.
+    fn worse(&mut self, fault: &Fault, left: Duration) -> Option<(Duration, Fault)> {
+        let Fault::DiskFull { robot, .. } = fault else { return None };
+        if self.chance.happens(0.5) {
+            return None;
+        }
+        let later = self.time(0, 3000, left);
+        let down = Some(self.time(100, 3000, left - later));
+        Some((later, Fault::Crash { robot: *robot, down, disk: DiskFate::Kept }))
     }
 
     fn crash(&mut self, robot: usize, left: Duration) -> Fault {
@@ -224,26 +239,6 @@ impl Draw {
     /// A system in one of its editions: other needs, other length, other policy.
     fn deploy(&mut self, number: usize) -> Fault {
         let robot = self.chance.below(self.robots);
-        Fault::Deploy { robot, system: Box::new(edition(number, self.chance.below(6))) }
+        Fault::Deploy { robot, system: Box::new(edition::system(&mut self.chance, number)) }
     }
-}
-
-/// One edition of a small system.
-fn edition(number: usize, edition: usize) -> SystemSpec {
-    let memory = if edition.is_multiple_of(2) { 40 } else { 60 };
-    let needs = sdr_core::spec::Needs { memory: Bytes::mega(memory), cpu: Permille(50) };
-    let components = 2 + edition % 3;
-    let mut system = systems::chain(systems::name("system", number), components, needs);
-    for (index, component) in system.components.iter_mut().enumerate() {
-        let name = systems::component_name(number, index);
-        component.name = sdr_core::id::Name::new(&name).expect("short words make names");
-    }
-    for (index, wire) in system.connections.iter_mut().enumerate() {
-        wire.from.component = system.components[index].name.clone();
-        wire.to.component = system.components[index + 1].name.clone();
-    }
-    if edition >= 3 {
-        system.recovery = systems::patient();
-    }
-    system
 }

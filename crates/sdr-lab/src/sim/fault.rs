@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use sdr_core::{input::InstanceId, spec::SystemSpec, time::Instant, units::Dbm};
+use sdr_core::{
+    fitness::RolePolicy, input::InstanceId, spec::SystemSpec, time::Instant, units::Dbm,
+};
 
 use super::{
     air::{Cut, Way, Weather},
@@ -65,6 +67,10 @@ pub enum Fault {
     Deploy { robot: usize, system: Box<SystemSpec> },
     /// An operator undeploys.
     Undeploy { robot: usize, system: sdr_core::id::Name },
+    /// An operator gives the coordinator role to a robot.
+    MoveRole { robot: usize, to: usize },
+    /// An operator changes how the holder of the role is chosen.
+    RolePolicy { robot: usize, policy: Box<RolePolicy> },
 }
 
 /// A fault and its moment, counted from the beginning.
@@ -132,6 +138,8 @@ impl Fleet {
             }
             Fault::Deploy { robot, system } => self.deploy(*robot, system),
             Fault::Undeploy { robot, system } => self.undeploy(*robot, system),
+            Fault::MoveRole { robot, to } => self.move_role(*robot, *to),
+            Fault::RolePolicy { robot, policy } => self.set_role_policy(*robot, policy),
         }
         self.disturb(self.now);
     }

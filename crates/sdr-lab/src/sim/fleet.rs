@@ -6,10 +6,9 @@ use sdr_core::{
     api::DeployAnswer,
     brain::BrainConfig,
     event::Event,
-    id::{ComponentKey, Name, RobotId},
+    id::{ComponentKey, RobotId},
     input::{Input, InstanceId},
     order::Token,
-    spec::SystemSpec,
     time::Instant,
 };
 
@@ -215,20 +214,6 @@ impl Fleet {
         self.gone_after
     }
 
-    /// Deploys on a robot; nothing happens while it is off.
-    pub fn deploy(&mut self, robot: usize, system: &SystemSpec) {
-        self.requests += 1;
-        self.sights.push(Sight::Asked { robot, system: system.name.clone() });
-        self.tell(robot, Input::Deploy { request: self.requests, system: system.clone() });
-    }
-
-    /// Undeploys on a robot; nothing happens while it is off.
-    pub fn undeploy(&mut self, robot: usize, system: &Name) {
-        self.requests += 1;
-        self.sights.push(Sight::Asked { robot, system: system.clone() });
-        self.tell(robot, Input::Undeploy { request: self.requests, system: system.clone() });
-    }
-
     /// Starts a robot's agent from what is on its disk.
     pub fn switch_on(&mut self, robot: usize) {
         // Monotonic clocks begin anew with their machine, anywhere.
@@ -251,7 +236,7 @@ impl Fleet {
             false => Written::NotAtAll,
         };
         self.robots[robot].disk.crash(written);
-        let processes = self.robots[robot].stop();
+        let processes = self.robots[robot].stop(self.now);
         for (instance, process) in processes {
             self.forget(robot, instance, &process);
         }

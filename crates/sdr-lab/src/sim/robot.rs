@@ -44,6 +44,8 @@ pub struct Robot {
     /// Starts of the agent so far; what was due for an earlier one is dropped.
     pub(crate) life: u64,
     pub(crate) on_since: Instant,
+    /// When it lost power last; before its first start nobody counts on it.
+    pub(crate) off_since: Option<Instant>,
     pub(crate) brain: Option<Box<Brain>>,
     pub(crate) clock: Clock,
     pub(crate) drift_ppm: i64,
@@ -78,6 +80,7 @@ impl Robot {
             number,
             life: 0,
             on_since: Instant::ZERO,
+            off_since: Some(Instant::ZERO),
             brain: None,
             clock: Clock::new(Instant::ZERO, Instant::ZERO, drift_ppm),
             drift_ppm,
@@ -110,13 +113,17 @@ impl Robot {
             seed: (self.life << 40) ^ (self.number as u64) << 33,
             ..BrainConfig::new(self.id.clone(), self.facts.clone())
         };
-        let seams = Seams { recovery: Box::new(sdr_recovery::make) };
+        let seams = Seams {
+            recovery: Box::new(sdr_recovery::make),
+            allocation: Box::new(sdr_alloc::check),
+        };
         self.brain = Some(Brain::new(config, seams, self.disk.held().cloned(), shown));
     }
 
     /// Power is gone: agent, processes, routes.
-    pub(crate) fn stop(&mut self) -> BTreeMap<InstanceId, Process> {
+    pub(crate) fn stop(&mut self, now: Instant) -> BTreeMap<InstanceId, Process> {
         self.brain = None;
+        self.off_since = Some(now);
         self.life += 1;
         self.outs.clear();
         self.ins.clear();
@@ -150,6 +157,11 @@ impl Robot {
     /// Whether it believes that it is the coordinator itself.
     pub fn is_coordinator(&self) -> bool {
         self.coordinator().is_some_and(|(holder, _)| *holder == self.id)
+    }
+
+    /// Whether it decides for others now.
+    pub fn coordinates(&self) -> bool {
+        self.brain.as_ref().is_some_and(|brain| brain.coordinates())
     }
 
     /// Starts and ends of its agent so far: names one life of it.

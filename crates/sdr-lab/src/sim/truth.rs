@@ -7,6 +7,7 @@ use sdr_core::{
     mesh::FleetTable,
     order::hash64,
     record::{FleetValue, RecordKind},
+    spec::{ComponentSpec, IsolationAction},
     time::Instant,
     units::Bytes,
 };
@@ -61,6 +62,31 @@ impl Fleet {
         deaf.chain(cuts).chain(paused).max()
     }
 
+    /// Since when nobody can both hear a robot and be heard by it; `None` when somebody can,
+    /// or it is off, or the only one there is.
+    pub fn alone_since(&self, robot: usize) -> Option<Instant> {
+        let on_since = self.robots[robot].is_on().then_some(self.robots[robot].on_since)?;
+        let others = (0..self.robots.len()).filter(|other| *other != robot);
+        let apart: Option<Vec<Instant>> =
+            others.map(|other| self.apart_since(robot, other)).collect();
+        apart?.into_iter().max().map(|since| since.max(on_since))
+    }
+
+    /// Since when one thing keeps two robots from hearing each other.
+    pub fn apart_since(&self, a: usize, b: usize) -> Option<Instant> {
+        let other = &self.robots[b];
+        let off = other.off_since.filter(|_| !other.is_on());
+        let deaf = [a, b].into_iter().filter_map(|robot| self.air.deaf_since(robot, self.now));
+        let cuts = self.air.cuts.iter().filter(|cut| cut.stops(a, b) || cut.stops(b, a));
+        let paused = (self.now < other.paused_until).then_some(other.paused_at);
+        deaf.chain(cuts.map(|cut| cut.since)).chain(off).chain(paused).min()
+    }
+
+    /// Whether a robot's agent stood still at any time since then.
+    pub fn was_paused_since(&self, robot: usize, since: Instant) -> bool {
+        self.robots[robot].paused_until > since
+    }
+
     /// Whether a robot's radio was deaf at any time since then.
     pub fn was_deaf_since(&self, robot: usize, since: Instant) -> bool {
         self.air.was_deaf_since(robot, since)
@@ -78,7 +104,7 @@ impl Fleet {
         let mut wanted: Vec<ComponentKey> = Vec::new();
         // of a large fleet a few robots speak for all
         let tables = robots.iter().take(SPEAKERS).filter_map(|robot| self.table(*robot));
-        // the table with the greatest revision of a system decides
+        // the table with the greatest version of a system decides
         let mut systems = std::collections::BTreeMap::new();
         for table in tables {
             for (key, version, value) in table.of_kind(RecordKind::SYSTEM) {
@@ -104,7 +130,7 @@ impl Fleet {
                 else {
                     continue;
                 };
-                if of == system.name.as_str() && part.revision == version.revision {
+                if of == system.name.as_str() && *part == version {
                     wanted.push(ComponentKey::new(&system.name, &spec.name));
                 }
             }
@@ -114,13 +140,7 @@ impl Fleet {
 
     /// Whether one of these robots may and can run a component beside what it runs now.
     pub fn is_feasible(&self, key: &ComponentKey, side: &[usize]) -> bool {
-        let name = format!("{}/{}", key.system, key.name);
-        let specs = side.iter().take(SPEAKERS).filter_map(|robot| {
-            let (version, value) = self.table(*robot)?.get(RecordKind::COMPONENT, &name)?;
-            let FleetValue::Component(spec) = value else { return None };
-            Some((version.revision, spec))
-        });
-        let Some((_, spec)) = specs.max_by_key(|(revision, _)| *revision) else { return false };
+        let Some(spec) = self.spec(key, side) else { return false };
         side.iter().map(|robot| &self.robots[*robot]).any(|robot| {
             let host = robot.measured();
             let memory = robot.facts.memory_capacity.less(host.memory_used).less(spec.needs.memory);
@@ -129,6 +149,23 @@ impl Fleet {
                 && memory >= MEMORY_LEFT
                 && cpu.0 * 5 >= robot.facts.cpu_capacity.0
         })
+    }
+
+    /// How long a component may act while nobody hears its robot; `None`: for ever.
+    pub fn lease(&self, key: &ComponentKey, side: &[usize]) -> Option<Duration> {
+        let isolation = self.spec(key, side)?.on_isolation;
+        (isolation.action == IsolationAction::Deactivate).then_some(isolation.after)
+    }
+
+    /// The latest spec of a component that these robots hold.
+    fn spec(&self, key: &ComponentKey, side: &[usize]) -> Option<&ComponentSpec> {
+        let name = format!("{}/{}", key.system, key.name);
+        let specs = side.iter().take(SPEAKERS).filter_map(|robot| {
+            let (version, value) = self.table(*robot)?.get(RecordKind::COMPONENT, &name)?;
+            let FleetValue::Component(spec) = value else { return None };
+            Some((version, spec))
+        });
+        specs.max_by_key(|(version, _)| *version).map(|(_, spec)| spec)
     }
 
     /// How many components were ever seen.

@@ -2,6 +2,8 @@
 
 use std::{fmt, time::Duration};
 
+use sdr_core::spec::{IsolationAction, SystemSpec};
+
 use super::{Behaviour, ClockFate, DiskFate, Fault, Way};
 
 impl fmt::Display for Fault {
@@ -54,14 +56,38 @@ fn words(fault: &Fault) -> String {
         Fault::Fade { robot, level_dbm, time } => {
             format!("{} measures {level_dbm} dBm for {}", name(*robot), seconds(*time))
         }
-        Fault::Deploy { robot, system } => {
-            let count = system.components.len();
-            format!("{} is told to deploy {}, {count} components", name(*robot), system.name)
-        }
+        Fault::Deploy { robot, system } => deployed(*robot, system),
         Fault::Undeploy { robot, system } => {
             format!("{} is told to undeploy {system}", name(*robot))
         }
+        Fault::MoveRole { robot, to } => {
+            format!("{} is told to give the role to {}", name(*robot), name(*to))
+        }
+        Fault::RolePolicy { robot, policy } => {
+            format!("{} is told to choose holders by `{}`", name(*robot), policy.name)
+        }
     }
+}
+
+fn deployed(robot: usize, system: &SystemSpec) -> String {
+    let mut text = format!(
+        "{} is told to deploy {}, {} components",
+        name(robot),
+        system.name,
+        system.components.len()
+    );
+    let policies = [("allocation", &system.allocation), ("recovery", &system.recovery)];
+    for (what, policy) in policies {
+        if !policy.bytes.is_empty() {
+            text.push_str(&format!(", {what} `{}`", policy.name));
+        }
+    }
+    let leased = system.components.iter().map(|component| component.on_isolation);
+    let leased = leased.filter(|isolation| isolation.action == IsolationAction::Deactivate);
+    if let Some(lease) = leased.map(|isolation| isolation.after).max() {
+        text.push_str(&format!(", leases of {}", seconds(lease)));
+    }
+    text
 }
 
 fn crash(robot: usize, down: Option<Duration>, disk: DiskFate) -> String {

@@ -5,7 +5,7 @@ use std::{
     time::Duration,
 };
 
-use sdr_core::{id::Name, time::Instant};
+use sdr_core::{id::Name, record::RecordKind, time::Instant};
 
 use crate::sim::{ActiveProcess, Broken, Checker, Fleet, Sight};
 
@@ -31,7 +31,7 @@ impl Checker for Heals {
             self.healed_at = Some(fleet.now);
             self.before = (0..fleet.components())
                 .map(|component| (component, fleet.active_of(component).to_vec()))
-                .filter(|(_, active)| !active.is_empty())
+                .filter(|(component, active)| is_right(fleet, *component, active))
                 .filter(|(component, _)| !self.asked.contains(&fleet.key(*component).system))
                 .collect();
             self.asked.clear();
@@ -51,6 +51,17 @@ impl Checker for Heals {
         }
         matches!(sight, Sight::Look).then(|| self.look(fleet)).flatten()
     }
+}
+
+/// Whether one of these processes is the one that stays: it works under the greatest choice of
+/// a home that any robot knows. When the home of that one was just lost, the others have to
+/// stop all the same, and a new one is found as for any home that is gone.
+fn is_right(fleet: &Fleet, component: usize, active: &[ActiveProcess]) -> bool {
+    let name = fleet.key(component).to_string();
+    let tables = (0..fleet.robots.len()).filter_map(|robot| fleet.table(robot));
+    let homes = tables.filter_map(|table| table.get(RecordKind::ASSIGNMENT, &name));
+    let greatest = homes.filter_map(|(version, _)| version.epoch.as_ref()).max();
+    active.iter().any(|active| greatest.is_none_or(|epoch| active.token.epoch >= *epoch))
 }
 
 impl Heals {

@@ -3,7 +3,12 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use sdr_core::{id::ComponentKey, time::Instant};
+use sdr_core::{
+    fitness::Alone,
+    id::ComponentKey,
+    record::{FleetValue, RecordKind},
+    time::Instant,
+};
 
 use crate::sim::{Broken, Checker, Fleet, Sight};
 
@@ -11,6 +16,8 @@ use crate::sim::{Broken, Checker, Fleet, Sight};
 const DETECTION: Duration = Duration::from_secs(12);
 /// From then on, until its components run elsewhere.
 const REHOMED: Duration = Duration::from_secs(3);
+/// A home with a lease is given up so long after its end.
+const LEASE_OVER: Duration = Duration::from_secs(1);
 /// A component whose ladder was climbed is left alone by its robots for so long
 /// (`not_back_for`, with what it takes to notice).
 const TROUBLED: Duration = Duration::from_secs(135);
@@ -56,21 +63,27 @@ impl Homeless {
         let mut since = BTreeMap::new();
         let mut found = None;
         for side in fleet.sides() {
-            // a robot alone decides nothing for others
-            if side.len() < 2 && fleet.robots.len() > 2 {
+            // a robot alone decides nothing for others, and nothing at all that was told to wait
+            let alone = side.len() < 2;
+            if alone && (fleet.robots.len() > 2 || waits(fleet, &side)) {
                 continue;
             }
             for key in fleet.wanted(&side) {
                 let runs_here = |active: &crate::sim::ActiveProcess| side.contains(&active.robot);
-                if !fleet.is_feasible(&key, &side) || fleet.active(&key).iter().any(runs_here) {
+                // who has a lease may not act alone, and its successor waits for its end
+                let lease = fleet.lease(&key, &side);
+                let must_not = alone && lease.is_some();
+                let patience = lease.map_or(DETECTION, |lease| DETECTION.max(lease + LEASE_OVER));
+                let runs = fleet.active(&key).iter().any(runs_here);
+                if must_not || runs || !fleet.is_feasible(&key, &side) {
                     continue;
                 }
                 let name = (side[0], key.clone());
                 let begun = self.since.get(&name).copied().unwrap_or(fleet.now);
                 since.insert(name, begun);
                 let clear = begun.max(fleet.steady_since());
-                let late = fleet.now >= clear + DETECTION + REHOMED
-                    && fleet.is_steady_for(DETECTION + REHOMED);
+                let late = fleet.now >= clear + patience + REHOMED
+                    && fleet.is_steady_for(patience + REHOMED);
                 let troubled = self.troubled.get(&key).is_some_and(|at| fleet.now < *at + TROUBLED);
                 if late && !troubled {
                     let what = format!(
@@ -85,4 +98,12 @@ impl Homeless {
         self.since = since;
         found
     }
+}
+
+/// Whether the fleet's role policy lets the last robot wait for the other.
+fn waits(fleet: &Fleet, side: &[usize]) -> bool {
+    let tables = side.iter().filter_map(|robot| fleet.table(*robot));
+    tables.filter_map(|table| table.get(RecordKind::ROLE_POLICY, "")).any(
+        |(_, value)| matches!(value, FleetValue::RolePolicy(policy) if policy.alone == Alone::Wait),
+    )
 }

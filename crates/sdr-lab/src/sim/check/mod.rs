@@ -5,7 +5,9 @@ mod coordinators;
 mod deployments;
 mod heals;
 mod homeless;
+mod leases;
 mod orders;
+mod scramble;
 mod tokens;
 
 pub mod convergence;
@@ -15,7 +17,9 @@ pub use coordinators::Coordinators;
 pub use deployments::Deployments;
 pub use heals::Heals;
 pub use homeless::Homeless;
+pub use leases::Leases;
 pub use orders::Orders;
+pub use scramble::Scramble;
 pub use tokens::Tokens;
 
 use super::Checker;
@@ -26,7 +30,9 @@ pub(crate) fn all() -> Vec<Box<dyn Checker>> {
         Box::<Tokens>::default(),
         Box::<Orders>::default(),
         Box::<Homeless>::default(),
+        Box::<Leases>::default(),
         Box::<Coordinators>::default(),
+        Box::<Scramble>::default(),
         Box::<Heals>::default(),
         Box::<Deployments>::default(),
         Box::<Bounds>::default(),

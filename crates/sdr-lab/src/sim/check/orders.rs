@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use sdr_core::{
     mesh::{FleetRecord, FleetTable},
     order::{Version, hash64},
-    record::{FleetKey, RecordKind},
+    record::{FleetKey, FleetValue, RecordKind},
 };
 
 use crate::sim::{Broken, Checker, Fleet, Sight};
@@ -72,7 +72,7 @@ impl Orders {
     }
 
     fn value_of(&mut self, record: &FleetRecord) -> Option<Broken> {
-        if record.key.kind == RecordKind::SYSTEM {
+        if record.key.kind == RecordKind::SYSTEM || is_by_operator(record) {
             return None;
         }
         let value = hash64(&record.value);
@@ -83,6 +83,14 @@ impl Orders {
             Broken::new("version-twice", what)
         })
     }
+}
+
+/// Whether an operator named this holder of the role: the record is made by the robot that was
+/// asked, and its author stands for the holder. Holder and term are all of its order, and a
+/// holder may take the same term by itself meanwhile.
+fn is_by_operator(record: &FleetRecord) -> bool {
+    let value = FleetValue::decode(record.key.kind, &record.value);
+    matches!(value, Ok(FleetValue::Role(role)) if role.by_operator)
 }
 
 fn records(fleet: &Fleet, robot: usize) -> impl Iterator<Item = &FleetRecord> {
@@ -99,7 +107,8 @@ fn wire_before_disk(fleet: &Fleet, robot: usize) -> Option<Broken> {
     let own = fleet.table(robot)?;
     let others = (0..fleet.robots.len()).filter(|other| *other != robot).take(50);
     for other in others {
-        let mine = records(fleet, other).filter(|record| record.version.author == *me);
+        let mine = records(fleet, other);
+        let mine = mine.filter(|record| record.version.author == *me && !is_by_operator(record));
         for record in mine {
             if own.record(&record.key).is_none_or(|own| own.version < record.version) {
                 let what = format!(
