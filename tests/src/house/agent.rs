@@ -152,13 +152,18 @@ state = {state:?}
 
     /// The process id of a component's newest instance here.
     pub fn component_pid(&self, component: &str) -> Option<u32> {
+        self.component_pids(component).pop()
+    }
+
+    /// Process ids of all instances of a component that were started here, the first first.
+    pub fn component_pids(&self, component: &str) -> Vec<u32> {
         let of = |view: &&EventView| {
             view.event.component.as_ref().is_some_and(|name| name.as_str() == component)
         };
         let started = self.events("started");
-        let newest = started.iter().rfind(of)?;
+        let pids = started.iter().filter(of).filter_map(|view| view.event.numbers.get("pid"));
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a pid")]
-        newest.event.numbers.get("pid").map(|pid| *pid as u32)
+        pids.map(|pid| *pid as u32).collect()
     }
 
     /// Puts an executable script where this robot looks for components.

@@ -5,3 +5,4 @@ mod demo;
 mod garbage;
 mod keys;
 mod role;
+mod standby;
