@@ -9,7 +9,7 @@ use std::{
 
 use sdr_core::{
     id::RobotId,
-    mesh::{FleetRecord, FleetTable, Incarnation, Mesh, MeshConfig, MeshNews, Push},
+    mesh::{FleetRecord, FleetTable, Incarnation, Mesh, MeshConfig, Push},
     report::{HostReport, Report},
     rng::Rng,
     time::Instant,
@@ -17,43 +17,19 @@ use sdr_core::{
 };
 
 /// UDP and IP headers and the seal of one datagram.
-pub(crate) const OVERHEAD_BYTES: u64 = 28 + 30;
+pub(crate) const OVERHEAD_BYTES: u64 = 28 + 32;
 /// As the brain has it: a handler that was not called for so long was itself paused.
 const PAUSE_MIN: Duration = Duration::from_millis(800);
 /// Each robot has new figures so often.
 const HOST_PERIOD: Duration = Duration::from_secs(1);
 
-/// What goes wrong all the time.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Trouble {
-    /// Lost datagrams, thousandths.
-    pub(crate) loss_permille: usize,
-    /// Every fifth robot neither hears nor says anything for so long of each minute.
-    pub(crate) deaf: Duration,
-    /// Each robot's process stands still for so long, once a minute on average.
-    pub(crate) stall: Duration,
-}
-
 /// One mesh and what it was charged with.
 pub(crate) struct Robot {
     pub(crate) mesh: Mesh,
     pub(crate) bytes: u64,
-    pub(crate) datagrams: u64,
-    pub(crate) starts: u64,
-    alive: bool,
     handled_at: Instant,
-    deaf_phase: Duration,
-    stalled_until: Instant,
     host_at: Instant,
     tick_at: Instant,
-}
-
-/// What an observer said of another robot.
-#[derive(Clone, Debug)]
-pub(crate) struct Said {
-    pub(crate) at: Instant,
-    pub(crate) observer: usize,
-    pub(crate) news: MeshNews,
 }
 
 enum Event {
@@ -65,8 +41,7 @@ enum Event {
 pub(crate) struct Fleet {
     pub(crate) robots: Vec<Robot>,
     pub(crate) now: Instant,
-    pub(crate) said: Vec<Said>,
-    pub(crate) trouble: Trouble,
+    pub(crate) loss_permille: usize,
     names: BTreeMap<RobotId, usize>,
     rng: Rng,
     queue: BinaryHeap<Reverse<(Instant, u64)>>,
@@ -75,12 +50,11 @@ pub(crate) struct Fleet {
 }
 
 impl Fleet {
-    pub(crate) fn new(count: usize, trouble: Trouble, seed: u64) -> Self {
+    pub(crate) fn new(count: usize, seed: u64) -> Self {
         let mut fleet = Self {
             robots: Vec::new(),
             now: Instant::ZERO,
-            said: Vec::new(),
-            trouble,
+            loss_permille: 0,
             names: (0..count).map(|number| (name(number), number)).collect(),
             rng: Rng::new(seed),
             queue: BinaryHeap::new(),
@@ -88,14 +62,14 @@ impl Fleet {
             number: 0,
         };
         for number in 0..count {
-            let robot = fleet.robot(number, count, 1);
+            let robot = fleet.robot(number, count);
             fleet.robots.push(robot);
             fleet.schedule_tick(number);
         }
         fleet
     }
 
-    fn robot(&mut self, number: usize, count: usize, starts: u64) -> Robot {
+    fn robot(&mut self, number: usize, count: usize) -> Robot {
         // some know two seeds only; the others are found
         let seeds = (0..8).map(|_| address(self.rng.below(count))).collect();
         let config = MeshConfig {
@@ -107,7 +81,7 @@ impl Fleet {
             gone_after: Duration::from_millis(11_500),
         };
         let nonce = u32::try_from(self.rng.below(1 << 30)).expect("30 bits");
-        let own = Incarnation { counter: starts, nonce };
+        let own = Incarnation { counter: 1, nonce };
         let mesh = Mesh::new(config, own, FleetTable::default(), &[], self.now);
         let phase = |rng: &mut Rng, of: Duration| {
             of * u32::try_from(rng.below(1000)).expect("small") / 1000
@@ -115,12 +89,7 @@ impl Fleet {
         Robot {
             mesh,
             bytes: 0,
-            datagrams: 0,
-            starts,
-            alive: true,
             handled_at: self.now,
-            deaf_phase: phase(&mut self.rng, Duration::from_secs(60)),
-            stalled_until: Instant::ZERO,
             host_at: self.now + phase(&mut self.rng, HOST_PERIOD),
             tick_at: self.now,
         }
@@ -128,22 +97,6 @@ impl Fleet {
 
     pub(crate) fn number_of(&self, robot: &RobotId) -> usize {
         self.names[robot]
-    }
-
-    pub(crate) fn is_on(&self, number: usize) -> bool {
-        self.robots[number].alive
-    }
-
-    pub(crate) fn kill(&mut self, number: usize) {
-        self.robots[number].alive = false;
-    }
-
-    pub(crate) fn restart(&mut self, number: usize) {
-        let starts = self.robots[number].starts + 1;
-        let count = self.robots.len();
-        let robot = self.robot(number, count, starts);
-        self.robots[number] = robot;
-        self.schedule_tick(number);
     }
 
     /// Robot `number` makes a shared record and says so at once.
@@ -180,51 +133,20 @@ impl Fleet {
     fn happen(&mut self, event: Event) {
         match event {
             Event::Tick(number) => {
-                if self.postponed(number, Event::Tick(number)) {
-                    return;
-                }
                 let now = self.now;
                 let robot = &mut self.robots[number];
-                if !robot.alive || now < robot.tick_at {
+                if now < robot.tick_at {
                     return;
                 }
                 robot.wake(now);
-                self.maybe_stall(number);
                 self.after(number);
             }
             Event::Arrive { to, from, bytes } => {
-                if self.is_deaf(to) || !self.robots[to].alive {
-                    return;
-                }
-                if self.robots[to].stalled_until > self.now {
-                    self.postponed(to, Event::Arrive { to, from, bytes });
-                    return;
-                }
                 let now = self.now;
                 self.robots[to].wake(now);
                 self.robots[to].mesh.handle_datagram(now, address(from), &bytes);
                 self.after(to);
             }
-        }
-    }
-
-    /// A robot that stands still takes everything afterwards.
-    fn postponed(&mut self, number: usize, event: Event) -> bool {
-        let until = self.robots[number].stalled_until;
-        let late = until > self.now;
-        if late {
-            self.schedule(until, event);
-        }
-        late
-    }
-
-    fn maybe_stall(&mut self, number: usize) {
-        if self.trouble.stall.is_zero() {
-            return;
-        }
-        // ticks come about 20 times in 7 s
-        if self.rng.below(171) == 0 {
-            self.robots[number].stalled_until = self.now + self.trouble.stall;
         }
     }
 
@@ -240,20 +162,15 @@ impl Fleet {
             robot.mesh.report(&Report::Host(host), Push::WithGossip);
         }
         robot.mesh.handle_tick(now);
-        while let Some(news) = robot.mesh.poll_news() {
-            if !matches!(news, MeshNews::Report(_) | MeshNews::Record(_)) {
-                self.said.push(Said { at: now, observer: number, news });
-            }
-        }
+        while robot.mesh.poll_news().is_some() {}
         let mut flying = Vec::new();
         while let Some((to, bytes)) = robot.mesh.poll_send() {
             robot.bytes += bytes.len() as u64 + OVERHEAD_BYTES;
-            robot.datagrams += 1;
             flying.push((to, bytes));
         }
         for (to, bytes) in flying {
-            let lost = self.rng.below(1000) < self.trouble.loss_permille;
-            if lost || self.is_deaf(number) {
+            let lost = self.rng.below(1000) < self.loss_permille;
+            if lost {
                 continue;
             }
             let to = usize::from(to.port()) - 1000;
@@ -261,15 +178,6 @@ impl Fleet {
             self.schedule(now + delay, Event::Arrive { to, from: number, bytes });
         }
         self.schedule_tick(number);
-    }
-
-    fn is_deaf(&self, number: usize) -> bool {
-        if self.trouble.deaf.is_zero() || !number.is_multiple_of(5) {
-            return false;
-        }
-        let age = self.now.since(Instant::ZERO) + self.robots[number].deaf_phase;
-        let within = Duration::from_millis(u64::try_from(age.as_millis() % 60_000).expect("small"));
-        within < self.trouble.deaf
     }
 
     fn schedule_tick(&mut self, number: usize) {

@@ -34,14 +34,21 @@ const USAGE_CPU_STEP: u32 = 20;
 /// A change of the radio that is said at once, tenths of a dBm.
 const RSSI_STEP: u16 = 10;
 
-/// Links said, beside those that components here use.
+/// Links said, beside those that components here use: a sample that the fleet shares, so
+/// that what all robots say of their links stays the same however many they are.
 const LINKS_SAID: usize = 8;
+const LINKS_SAID_MIN: usize = 4;
+const LINKS_SAID_BY_ALL: usize = 480;
+/// Of those, links are said once they are measured so well, thousandths of loss.
+const LINK_NOISE_MAX: Permille = Permille(200);
 /// A change of a round trip that is said, as a share of it, when it is more than a few ms.
 const RTT_SHARE: u32 = 4;
 /// Changes of round trips and jitter below this are noise.
 const RTT_STEP: Duration = Duration::from_millis(5);
-/// A change of loss that is said, thousandths.
+/// A change of loss that is said, thousandths, when chance does not explain it ...
 const LOSS_STEP: u32 = 80;
+/// ... by so many standard deviations of what was counted.
+const LOSS_DEVIATIONS: u32 = 3;
 
 /// Refusals of one component that others hear of; all of them stand in the event.
 const REFUSALS_TOLD: usize = 8;
@@ -132,34 +139,46 @@ impl Brain {
             self.mesh.retract(&AuthorKey::link(&robot));
         }
         for (robot, link) in links {
-            if self.said.links.get(&robot).is_none_or(|before| link_differs(before, &link)) {
+            let noise = self.mesh.link_noise(&robot);
+            let before = self.said.links.get(&robot);
+            if before.is_none_or(|before| link_differs(before, &link, noise)) {
                 self.said.links.insert(robot.clone(), link);
                 self.mesh.report(&Report::Link(robot, link), Push::WithGossip);
             }
         }
     }
 
-    /// Links to the homes that components here talk with and to the coordinator, and some
-    /// others, so that a report does not grow with the fleet.
+    /// Links to the homes that components here talk with, and some others, so that a report
+    /// does not grow with the fleet.
     fn links_that_matter(&self) -> BTreeMap<RobotId, LinkReport> {
         let mut matter: BTreeSet<RobotId> = BTreeSet::new();
         for key in self.index.at(&self.me) {
             matter.extend(self.partners(key));
         }
-        matter.extend(self.role().map(|role| role.holder.clone()));
+        let fleet = self.mesh.authors().robots().count();
+        let sampled = fleet > LINKS_SAID + 1;
+        if !sampled {
+            matter.extend(self.role().map(|role| role.holder.clone()));
+        }
         let mut links: BTreeMap<RobotId, LinkReport> = BTreeMap::new();
         let mut others = Vec::new();
         for (robot, link) in self.mesh.links() {
             if matter.contains(robot) {
                 links.insert(robot.clone(), link);
             } else {
-                // the same few on every look, others on every robot
-                let names = [self.me.as_str(), robot.as_str()].concat();
-                others.push((crate::order::hash64(names.as_bytes()), robot.clone(), link));
+                // those said before stay; others on every robot
+                let before = self.said.links.contains_key(robot);
+                let measured = !sampled || self.mesh.link_noise(robot) <= LINK_NOISE_MAX;
+                if before || measured {
+                    let names = [self.me.as_str(), robot.as_str()].concat();
+                    let hash = crate::order::hash64(names.as_bytes());
+                    others.push(((!before, hash), robot.clone(), link));
+                }
             }
         }
-        others.sort_unstable_by_key(|(hash, ..)| *hash);
-        let room = LINKS_SAID.saturating_sub(links.len());
+        others.sort_unstable_by_key(|(rank, ..)| *rank);
+        let share = LINKS_SAID_BY_ALL / fleet.max(1);
+        let room = share.clamp(LINKS_SAID_MIN, LINKS_SAID).saturating_sub(links.len());
         links.extend(others.into_iter().take(room).map(|(_, robot, link)| (robot, link)));
         links
     }
@@ -273,10 +292,11 @@ fn differs(before: &HostReport, now: &HostReport) -> bool {
 }
 
 /// Whether a link is worth saying again.
-fn link_differs(before: &LinkReport, now: &LinkReport) -> bool {
+fn link_differs(before: &LinkReport, now: &LinkReport, noise: Permille) -> bool {
     let time =
         |before: Duration, now: Duration| before.abs_diff(now) >= RTT_STEP.max(before / RTT_SHARE);
-    let share = |before: Permille, now: Permille| before.0.abs_diff(now.0) >= LOSS_STEP;
+    let step = LOSS_STEP.max(noise.0 * LOSS_DEVIATIONS);
+    let share = |before: Permille, now: Permille| before.0.abs_diff(now.0) >= step;
     time(before.rtt, now.rtt)
         || time(before.jitter, now.jitter)
         || share(before.loss, now.loss)

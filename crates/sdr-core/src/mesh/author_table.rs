@@ -10,9 +10,10 @@ use alloc::{
 
 use super::{
     author::{Author, AuthorKey, Incarnation},
+    fleet_table::fold,
     wire::{cut, last_of},
 };
-use crate::{id::RobotId, report::Report};
+use crate::{id::RobotId, order::hash64, report::Report};
 
 /// Most robots known; more are refused.
 pub(super) const AUTHORS_MAX: usize = 2000;
@@ -75,6 +76,11 @@ pub struct AuthorTable {
     id_seats: Vec<Seat>,
     /// XOR over all ids.
     hash: u32,
+    /// All seats in the order of their robots' names, and the place of each seat among them.
+    seats_by_name: Vec<Seat>,
+    places: Vec<u16>,
+    /// XOR over hashes of all names.
+    names_hash: u32,
     /// Own records that changed and wait for their release.
     staged: BTreeSet<AuthorKey>,
 }
@@ -84,6 +90,9 @@ impl AuthorTable {
         let author = Author::new(me.clone(), own);
         Self {
             hash: author.id,
+            seats_by_name: Vec::from([Seat::OWN]),
+            places: Vec::from([0]),
+            names_hash: name_hash(&me),
             by_name: BTreeMap::from([(me, Seat::OWN)]),
             ids: Vec::from([author.id]),
             id_seats: Vec::from([Seat::OWN]),
@@ -147,6 +156,21 @@ impl AuthorTable {
         ids.zip(self.id_seats[first..].iter().copied()).take_while(move |(id, _)| *id <= high)
     }
 
+    /// Whose name has so many smaller ones.
+    pub(super) fn at_place(&self, place: usize) -> Option<Seat> {
+        self.seats_by_name.get(place).copied()
+    }
+
+    /// How many names come before that of `seat`.
+    pub(super) fn place_of(&self, seat: Seat) -> Option<u16> {
+        self.places.get(seat.0).copied()
+    }
+
+    /// Hash over the names of all robots known.
+    pub(super) fn names_hash(&self) -> u32 {
+        self.names_hash
+    }
+
     /// Index of the first id that is not less than `id`. Ids are hashes, evenly spread: the
     /// place is near where their share of all numbers says.
     fn place(&self, id: u32) -> usize {
@@ -186,6 +210,8 @@ impl AuthorTable {
                 self.by_name.insert(robot.clone(), seat);
                 self.index(author.id, seat);
                 self.seats.push(author);
+                self.names_hash ^= name_hash(robot);
+                self.order_by_name();
                 Admission::New(seat)
             }
         }
@@ -250,9 +276,21 @@ impl AuthorTable {
         self.seats[seat.0] = author;
     }
 
+    fn order_by_name(&mut self) {
+        self.seats_by_name = self.by_name.values().copied().collect();
+        self.places = Vec::from_iter(core::iter::repeat_n(0, self.seats.len()));
+        for (place, seat) in (0..).zip(&self.seats_by_name) {
+            self.places[seat.0] = place;
+        }
+    }
+
     fn index(&mut self, id: u32, seat: Seat) {
         let place = self.place(id);
         self.ids.insert(place, id);
         self.id_seats.insert(place, seat);
     }
+}
+
+fn name_hash(robot: &RobotId) -> u32 {
+    fold(hash64(robot.as_str().as_bytes()))
 }

@@ -13,7 +13,7 @@ use crate::{id::RobotId, time::Instant};
 /// Robots asked at once.
 const ASKED_MAX: usize = 4;
 /// Robots in one question.
-const SUBJECTS_MAX: usize = 4;
+pub(super) const SUBJECTS_MAX: usize = 8;
 /// Questions kept.
 const INQUIRIES_MAX: usize = 64;
 /// How long an answer is worth anything.
@@ -136,8 +136,8 @@ impl Mesh {
         if stamp.sequence > self.authors.at(seat).sequence() {
             self.repair.want(seat, self.clock);
         }
-        if let Some(address) = stamp.address.filter(|_| self.peers.address(seat).is_none()) {
-            self.peers.learn(address);
+        if let Some(address) = stamp.address.filter(|_| self.liveness.is_living(seat)) {
+            self.peers.suppose(seat, address);
         }
     }
 

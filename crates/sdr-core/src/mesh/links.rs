@@ -21,6 +21,8 @@ const WINDOW: u16 = 64;
 const SENT_MAX: usize = 32;
 /// A datagram that nobody echoed for so long is lost, when later ones are missing too.
 const LOST_AFTER: Duration = Duration::from_secs(2);
+/// A link is silent after so many of its usual gaps.
+const SILENT_GAPS: u32 = 6;
 /// Datagrams without any echo that make the way out a dead one.
 const UNECHOED_MAX: usize = 4;
 
@@ -33,6 +35,8 @@ struct Link {
     sent: VecDeque<(u16, Instant)>,
     /// The last number that came, when, and which of the 64 up to it did.
     came: Option<(u16, Instant)>,
+    /// Usual time from one to the next; zero when unknown.
+    gap: Duration,
     came_bits: u64,
     came_count: u16,
     /// What the other end says of the way out.
@@ -89,15 +93,20 @@ impl Links {
         self.links.remove(&seat);
     }
 
-    /// What was measured so far; a robot that lives and was not heard directly since
-    /// `silent_before` has a way in that loses everything.
+    /// What was measured so far; a robot that lives and was not heard directly for
+    /// `silent_after`, and for much longer than usual, has a way in that loses everything.
     pub(super) fn reports(
         &self,
         now: Instant,
-        silent_before: Instant,
+        silent_after: Duration,
     ) -> impl Iterator<Item = (Seat, LinkReport)> {
         let known = self.links.iter().filter(|(_, link)| link.came.is_some());
-        known.map(move |(seat, link)| (*seat, link.report(now, silent_before)))
+        known.map(move |(seat, link)| (*seat, link.report(now, silent_after)))
+    }
+
+    /// How far the loss of a link differs by chance from one count to the next.
+    pub(super) fn noise(&self, seat: Seat) -> Permille {
+        self.links.get(&seat).map_or(Permille(1000), Link::noise)
     }
 }
 
@@ -106,6 +115,11 @@ impl Link {
         let ahead = self.came.map_or(1, |(last, _)| number.wrapping_sub(last));
         let behind = ahead.wrapping_neg();
         if ahead != 0 && ahead < u16::MAX / 2 {
+            if let Some((_, before)) = self.came {
+                let gap = now.since(before);
+                let mean = self.gap - self.gap / 8 + gap / 8;
+                self.gap = if self.gap.is_zero() { gap } else { mean };
+            }
             let shifted = u32::from(ahead);
             self.came_bits = self.came_bits.checked_shl(shifted).unwrap_or(0) | 1;
             self.came_count = self.came_count.saturating_add(ahead).min(WINDOW);
@@ -167,10 +181,21 @@ impl Link {
         self.loss_out.map_or(0, |loss| u32::from(loss) * 1000 / 255)
     }
 
-    fn report(&self, now: Instant, silent_before: Instant) -> LinkReport {
+    /// The standard deviation of the loss there and back, were both ways alike; wide while
+    /// little was counted.
+    fn noise(&self) -> Permille {
+        let count = u32::from(self.came_count.max(1));
+        let lost = u32::from(self.lost_in()) * count;
+        let share = (lost + 1000) / (count + 2);
+        let variance = share * 1000u32.saturating_sub(share) / count;
+        Permille((2 * variance).isqrt())
+    }
+
+    fn report(&self, now: Instant, silent_after: Duration) -> LinkReport {
         let mut sorted: Vec<Duration> = self.round_trips.iter().copied().collect();
         sorted.sort_unstable();
-        let silent = self.came.is_some_and(|(_, at)| at < silent_before);
+        let silent_after = silent_after.max(self.gap * SILENT_GAPS);
+        let silent = self.came.is_some_and(|(_, at)| now.since(at) > silent_after);
         let loss_in = if silent { 1000 } else { u32::from(self.lost_in()) };
         let loss_out = self.lost_out(now);
         let both = 1000 - (1000 - loss_in) * (1000 - loss_out) / 1000;

@@ -276,12 +276,24 @@ impl Liveness {
     }
 
     /// The age at which a robot is quiet: as configured, or longer where news usually takes
-    /// longer, by what was measured and by how many robots share how many beats.
+    /// longer, by what was measured and by how long news takes through a fleet of this size.
     pub(super) fn quiet(&self) -> Duration {
-        let turn = micros(self.period) * (self.living as u64 + 1) / super::BEATS_TOLD as u64;
-        let usual = (self.gap_deviation * 11 / 2).max(turn * 8);
+        let usual = Duration::from_micros(self.gap_deviation * 9 / 2).max(self.passage());
         let base = self.quiet_base();
-        Duration::from_micros(usual).clamp(base, base * STRETCH_MAX)
+        usual.clamp(base, base * STRETCH_MAX)
+    }
+
+    /// Time in which nearly all news goes through the fleet: where each datagram tells of
+    /// all, the rounds in which it doubles and half as many; else eight turns of the beats.
+    fn passage(&self) -> Duration {
+        let round = super::round::period(self.period, self.living);
+        let told = super::round::beats_in_round(self.living);
+        if told == self.living {
+            let doublings = usize::BITS - self.living.leading_zeros();
+            return round * doublings * 3 / 2;
+        }
+        let ratio = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+        round * 8 * ratio(self.living) / ratio(told).max(1)
     }
 
     /// The age at which a robot is gone: later by half as much again as quiet is. In between

@@ -50,8 +50,8 @@ pub use lives::Memory;
 pub use news::{Inquiry, MeshConfig, MeshCounters, MeshNews, MeshTraffic, Push};
 pub use wire::{
     AskNews, AskStamps, AuthorDelta, Beat, Beats, DATAGRAM_BYTES_MAX, Datagram, Echo, FleetEntries,
-    FleetNodes, Header, LinkMark, News, RosterPiece, SEAL_BYTES_MAX, Section, Stamp, Summary,
-    WireError,
+    FleetNodes, Header, LinkMark, News, PlacedBeat, Pulse, RosterPiece, SEAL_BYTES_MAX,
+    SECTION_NAMES, Section, Sign, Stamp, Summary, WireError,
 };
 
 use crate::{
@@ -60,6 +60,7 @@ use crate::{
     report::{LinkReport, Report},
     rng::Rng,
     time::Instant,
+    units::Permille,
 };
 use author_table::{Admission, Seat};
 use inquiry::Inquiries;
@@ -72,8 +73,12 @@ pub use round::BeatsFor;
 use round::{Guard, Told};
 use spread::Spread;
 
-/// Beats in one datagram; larger fleets take turns.
-const BEATS_TOLD: usize = 40;
+/// Fleets with at most so many others are told whole in each datagram ...
+const FLEET_TOLD: usize = 100;
+/// ... of larger ones the freshest so many, by turns.
+const BEATS_TOLD: usize = 75;
+/// Beats in one datagram when robots are named by ids of two bytes.
+const BEATS_BY_ID: usize = 40;
 /// Datagrams in answer to one, so that a small question has no huge answer.
 const ANSWERS_MAX: usize = 12;
 
@@ -175,9 +180,9 @@ impl Mesh {
     pub fn handle_tick(&mut self, now: Instant) {
         self.clock = now;
         if now >= self.round_at {
-            let tenth = self.config.period / 10;
+            let period = round::period(self.config.period, self.liveness.living_count());
             let chance = u32::try_from(self.rng.below(201)).unwrap_or(0);
-            self.round_at = now + self.config.period - tenth + tenth * chance / 100;
+            self.round_at = now + period - period / 10 + period / 10 * chance / 100;
             self.hold_round();
         }
         self.spread_due();
@@ -335,9 +340,15 @@ impl Mesh {
     /// Links of this robot, measured by it.
     pub fn links(&self) -> impl Iterator<Item = (&RobotId, LinkReport)> {
         let cycle = self.config.period * u32::try_from(self.authors.count()).unwrap_or(u32::MAX);
-        let silent_before = self.clock - (cycle * 6).max(self.config.gone_after / 2);
-        let reports = self.links.reports(self.clock, silent_before);
+        let silent_after = (cycle * 6).max(self.config.gone_after / 2);
+        let reports = self.links.reports(self.clock, silent_after);
         reports.map(|(seat, report)| (&self.authors.at(seat).robot, report))
+    }
+
+    /// How far the loss of the link to `robot` differs by chance from one count to the next,
+    /// one standard deviation.
+    pub fn link_noise(&self, robot: &RobotId) -> Permille {
+        self.authors.seat(robot).map_or(Permille(1000), |seat| self.links.noise(seat))
     }
 
     /// Addresses heard so far.

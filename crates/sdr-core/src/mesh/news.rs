@@ -75,6 +75,8 @@ pub struct MeshTraffic {
     pub caught_up: u64,
     /// Datagrams dropped because too many waited to be sent.
     pub dropped: u64,
+    /// Bytes of all datagrams by section ([`super::SECTION_NAMES`]), before the seal.
+    pub sections: [u64; super::SECTION_NAMES.len()],
 }
 
 /// A question to others about one robot.

@@ -33,12 +33,14 @@ impl Mesh {
         }
         all.extend(sections);
         let mut sent = 0;
-        for bytes in self.header().pack(&all).into_iter().take(ANSWERS_MAX) {
+        let header = self.header();
+        for bytes in header.pack(&all).into_iter().take(ANSWERS_MAX) {
             if self.outbox.len() >= OUTBOX_MAX {
                 self.traffic.dropped += 1;
                 continue;
             }
             sent += bytes.len();
+            header.tally(&bytes, &mut self.traffic.sections);
             self.outbox.push_back((to, bytes));
         }
         sent

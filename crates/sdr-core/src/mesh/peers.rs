@@ -60,6 +60,15 @@ impl Peers {
         self.strays.remove(&address);
     }
 
+    /// Others say that the robot of `seat`, which never spoke here, is heard from `address`.
+    pub(super) fn suppose(&mut self, seat: Seat, address: SocketAddr) {
+        let usable = !address.ip().is_unspecified() && address.port() != 0;
+        let free = self.address(seat).is_none() && !self.seats.contains_key(&address);
+        if usable && free && Some(address) != self.own && self.seats.len() < ADDRESSES_MAX {
+            self.hear(seat, address);
+        }
+    }
+
     /// Somebody says that a robot can be reached at `address`.
     pub(super) fn learn(&mut self, address: SocketAddr) {
         let usable = !address.ip().is_unspecified() && address.port() != 0;

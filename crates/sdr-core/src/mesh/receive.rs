@@ -5,7 +5,7 @@ use core::{net::SocketAddr, time::Duration};
 use alloc::vec::Vec;
 
 use super::{
-    Beats, Datagram, Header, Mesh, MeshNews, Section, Standing,
+    Beats, Datagram, Header, Mesh, MeshNews, Pulse, Section, Sign, Standing,
     author_table::{Admission, Lookup, Seat},
     liveness::Heard,
 };
@@ -15,7 +15,7 @@ use crate::time::Instant;
 const REORDER_MAX: Duration = Duration::from_secs(2);
 /// Beats of a robot whose last news is older than this are not understood: their bits may
 /// have come round.
-const BEAT_AGE_MAX: Duration = Duration::from_secs(210);
+const BEAT_AGE_MAX: Duration = Duration::from_secs(128);
 /// Robots told at once that this one hears again.
 const RETURN_PEERS: usize = 32;
 /// Addresses told to a robot that is new here.
@@ -89,6 +89,10 @@ impl Mesh {
             Section::Ping => answer.push(self.summary()),
             Section::Beats(beats) => self.take_beats(from, &beats),
             Section::Summary(summary) => self.compare(from, summary, answer),
+            Section::Pulse(pulse) => {
+                self.compare(from, pulse.summary, answer);
+                self.take_pulse(from, &pulse);
+            }
             Section::Stamps(stamps) => stamps.into_iter().for_each(|stamp| self.take_stamp(stamp)),
             Section::AskStamps(ask) => self.answer_stamps(&ask, answer),
             Section::AskRecords(asks) => self.answer_records(&asks, answer),
@@ -152,24 +156,52 @@ impl Mesh {
                     continue;
                 }
             };
-            let Some(seen) = self.liveness.get(seat) else { continue };
-            let forgotten = seen.standing == Standing::Unheard
-                || self.clock.since(seen.fresh_at) > BEAT_AGE_MAX;
-            if forgotten {
+            if !self.take_sign(seat, &beat.sign) {
                 unknown.push(beat.id);
-                continue;
-            }
-            if let Some(heartbeat) = beat.heartbeat_after(seen.heartbeat) {
-                let said_at = self.said_at(beat.age());
-                self.hear(seat, heartbeat, said_at);
-            }
-            if beat.is_ahead_of(self.authors.at(seat).sequence()) {
-                self.repair.want(seat, self.clock);
             }
         }
         if !unknown.is_empty() {
             self.ask_stamps(from, beats.wide, unknown);
         }
+    }
+
+    /// Beats by place mean something only to who knows the same robots.
+    fn take_pulse(&mut self, from: SocketAddr, pulse: &Pulse) {
+        let readable = pulse.names == self.authors.names_hash();
+        self.repair.note_names(readable);
+        if !readable {
+            return;
+        }
+        let mut unknown = Vec::new();
+        for beat in &pulse.beats {
+            let seat = self.authors.at_place(usize::from(beat.place));
+            let Some(seat) = seat.filter(|seat| *seat != Seat::OWN) else { continue };
+            let same_life = beat.sign.odd == (self.authors.at(seat).incarnation.counter & 1 == 1);
+            if !same_life || !self.take_sign(seat, &beat.sign) {
+                unknown.push(seat);
+            }
+        }
+        if !unknown.is_empty() {
+            self.ask_names(from, &unknown);
+        }
+    }
+
+    /// A sign of life from others; whether enough is known of the robot to read it.
+    fn take_sign(&mut self, seat: Seat, sign: &Sign) -> bool {
+        let Some(seen) = self.liveness.get(seat) else { return true };
+        let forgotten =
+            seen.standing == Standing::Unheard || self.clock.since(seen.fresh_at) > BEAT_AGE_MAX;
+        if forgotten {
+            return false;
+        }
+        if let Some(heartbeat) = sign.heartbeat_after(seen.heartbeat) {
+            let said_at = self.said_at(sign.age());
+            self.hear(seat, heartbeat, said_at);
+        }
+        if sign.is_ahead_of(self.authors.at(seat).sequence()) {
+            self.repair.want(seat, self.clock);
+        }
+        true
     }
 
     /// Tells who became quiet or gone, and whether nobody is heard any more.

@@ -5,10 +5,11 @@ use alloc::{collections::BTreeMap, vec, vec::Vec};
 use core::{net::SocketAddr, time::Duration};
 
 use super::{
-    ANSWERS_MAX, AskStamps, FleetEntries, FleetNodes, FleetRecord, Mesh, RosterPiece, Section,
-    Summary,
+    ANSWERS_MAX, AskNews, AskStamps, FleetEntries, FleetNodes, FleetRecord, Mesh, RosterPiece,
+    Section, Summary,
     author_table::Seat,
     fleet_tree::{DEPTH_MAX, range_of},
+    inquiry::SUBJECTS_MAX,
     spread::sections_of,
     wire::SECTION_BYTES_MAX,
 };
@@ -73,9 +74,12 @@ struct Session {
 pub(super) struct Repair {
     wants: BTreeMap<Seat, Want>,
     stamps_at: Option<Instant>,
+    names_at: Option<Instant>,
     corrected_at: Option<Instant>,
     roster_at: Option<Instant>,
     roster_doubts: u8,
+    /// The last who spoke knows the same robots by name.
+    names_agreed: bool,
     session: Option<Session>,
     unfinished: bool,
     changed_at: Option<Instant>,
@@ -98,6 +102,15 @@ impl Repair {
     /// The fleet table has news.
     pub(super) fn note_change(&mut self, now: Instant) {
         self.changed_at = Some(now);
+    }
+
+    /// Whether others know the same robots by name, as far as can be told.
+    pub(super) fn names_agree(&self) -> bool {
+        self.names_agreed
+    }
+
+    pub(super) fn note_names(&mut self, agree: bool) {
+        self.names_agreed = agree;
     }
 
     pub(super) fn may_correct(&mut self, now: Instant) -> bool {
@@ -159,6 +172,17 @@ impl Mesh {
         }
     }
 
+    /// Asks for news of robots of which others seem to know another life, or too much.
+    pub(super) fn ask_names(&mut self, from: SocketAddr, seats: &[Seat]) {
+        let may = self.repair.names_at.is_none_or(|at| self.clock.since(at) >= STAMPS_PERIOD);
+        if may {
+            self.repair.names_at = Some(self.clock);
+            let names = seats.iter().take(SUBJECTS_MAX);
+            let robots = names.map(|seat| self.authors.at(*seat).robot.clone()).collect();
+            self.send(from, vec![Section::AskNews(AskNews { number: 0, robots })]);
+        }
+    }
+
     pub(super) fn answer_stamps(&self, ask: &AskStamps, answer: &mut Vec<Section>) {
         let mut seats = Vec::new();
         for id in ask.ids.iter().take(STAMPS_ASKED_MAX) {
@@ -187,6 +211,7 @@ impl Mesh {
             answer.push(self.root_nodes());
         }
         if theirs.roster == self.authors.hash() {
+            self.repair.names_agreed = true;
             self.repair.roster_doubts = 0;
             return;
         }

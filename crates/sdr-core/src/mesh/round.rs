@@ -8,7 +8,8 @@ use alloc::{
 use core::{net::SocketAddr, time::Duration};
 
 use super::{
-    AskStamps, BEATS_TOLD, Beat, Beats, Mesh, Section, Standing, Summary,
+    AskStamps, BEATS_BY_ID, BEATS_TOLD, Beat, Beats, FLEET_TOLD, Mesh, PlacedBeat, Pulse, Section,
+    Sign, Standing, Summary,
     author_table::{Lookup, Seat},
     wire::{beat_len, cut},
 };
@@ -20,20 +21,22 @@ use crate::{
 
 /// Fleets with fewer others greet two of them each round.
 const SMALL_FLEET: usize = 8;
-/// Fleets up to this size spread by doubling strides.
-const STRIDE_FLEET: usize = 64;
+/// A round takes so much longer for each robot whose beat it carries.
+const ROUND_STRETCH: Duration = Duration::from_micros(600);
 /// Fleets up to this size have ids of two bytes.
 const NARROW_FLEET: usize = 64;
-/// Robots in one datagram by name, when they are new.
-const INTRODUCED_MAX: usize = 3;
+/// Robots in one datagram by name, when they are new: a quarter of those that wait.
+const INTRODUCED_MIN: usize = 3;
+const INTRODUCED_MAX: usize = 10;
 /// How often a new robot is told by name.
 const INTRODUCTIONS: u8 = 3;
 /// New robots that wait to be told; the others are found by comparing.
-const NEWCOMERS_MAX: usize = 64;
+const NEWCOMERS_MAX: usize = 256;
 /// Robots without an address that are asked for in one round.
 const ADDRESSES_ASKED_MAX: usize = 4;
-/// Whoever hears so many robots directly looks for more only now and then.
-const ADDRESSES_ENOUGH: usize = 64;
+/// Whoever knows the addresses of so many robots looks for more only now and then; more than
+/// are greeted by strides, since each of those counts on the few that greet it.
+const ADDRESSES_ENOUGH: usize = 128;
 /// Strays are tried again this often, unless nobody is heard.
 const STRAY_PERIOD: Duration = Duration::from_secs(4);
 /// A quiet robot is pinged at most so often.
@@ -61,7 +64,8 @@ impl Told {
     }
 
     fn next_newcomers(&mut self) -> Vec<Seat> {
-        let some: Vec<Seat> = self.newcomers.keys().copied().take(INTRODUCED_MAX).collect();
+        let count = (self.newcomers.len() / 4).clamp(INTRODUCED_MIN, INTRODUCED_MAX);
+        let some: Vec<Seat> = self.newcomers.keys().copied().take(count).collect();
         for seat in &some {
             let left = self.newcomers.get(seat).copied().unwrap_or(0);
             if left > 1 {
@@ -132,6 +136,17 @@ impl Guard {
     }
 }
 
+/// Beats in one datagram of a fleet with so many others.
+pub(super) fn beats_in_round(others: usize) -> usize {
+    if others <= FLEET_TOLD { others } else { BEATS_TOLD }
+}
+
+/// Time between two rounds in a fleet with so many others: the more one says, the less often.
+pub(super) fn period(shortest: Duration, others: usize) -> Duration {
+    let beats = u32::try_from(others.min(FLEET_TOLD)).unwrap_or(0);
+    shortest + ROUND_STRETCH * beats
+}
+
 impl Mesh {
     /// One round: release what waited, greet one or two, and whoever needs it.
     pub(super) fn hold_round(&mut self) {
@@ -166,13 +181,20 @@ impl Mesh {
 
     /// What every greeting holds: signs of life and hashes.
     pub(super) fn greeting(&mut self, to: Seat) -> Vec<Section> {
-        vec![Section::Beats(self.beats_for(to)), self.summary()]
+        if self.repair.names_agree() {
+            let (summary, names) = (self.hashes(), self.authors.names_hash());
+            return vec![Section::Pulse(Pulse { summary, names, beats: self.placed_beats(to) })];
+        }
+        vec![Section::Beats(self.beats_by_id(to)), self.summary()]
     }
 
     /// Hashes of what this robot holds.
     pub(super) fn summary(&self) -> Section {
-        let roster = self.authors.hash();
-        Section::Summary(Summary { fleet: self.fleet.tree().root(), roster })
+        Section::Summary(self.hashes())
+    }
+
+    fn hashes(&self) -> Summary {
+        Summary { fleet: self.fleet.tree().root(), roster: self.authors.hash() }
     }
 
     fn greet(&mut self, seat: Seat) {
@@ -202,7 +224,7 @@ impl Mesh {
     /// chance in between and in large ones.
     fn choose(&mut self, living: &[Seat]) -> Vec<Seat> {
         let mut chosen = Vec::new();
-        if (SMALL_FLEET..STRIDE_FLEET).contains(&living.len()) {
+        if (SMALL_FLEET..=FLEET_TOLD).contains(&living.len()) {
             let mut ring: Vec<(u32, Seat)> =
                 living.iter().map(|seat| (self.authors.at(*seat).id, *seat)).collect();
             ring.push((self.authors.at(Seat::OWN).id, Seat::OWN));
@@ -221,10 +243,35 @@ impl Mesh {
         chosen
     }
 
-    /// Signs of life of all others, or of those that are fresh and were told least.
-    fn beats_for(&mut self, to: Seat) -> Beats {
+    /// Beats that name robots by id, for whoever may not know the same ones.
+    fn beats_by_id(&mut self, to: Seat) -> Beats {
         let wide = self.authors.count() > NARROW_FLEET;
-        let room = if wide { BEATS_TOLD * beat_len(false) / beat_len(true) } else { BEATS_TOLD };
+        let room = if wide { BEATS_BY_ID * beat_len(false) / beat_len(true) } else { BEATS_BY_ID };
+        let mut beats = Vec::new();
+        for (seat, sign) in self.signs(to, room) {
+            let id = cut(self.authors.at(seat).id, wide);
+            match self.authors.lookup(id, wide) {
+                Lookup::One(_) => beats.push(Beat { id, sign }),
+                Lookup::Ambiguous => self.told.introduce(seat),
+                Lookup::Unknown => {}
+            }
+        }
+        Beats { wide, beats }
+    }
+
+    fn placed_beats(&mut self, to: Seat) -> Vec<PlacedBeat> {
+        let all = self.liveness.living_count();
+        let signs = self.signs(to, beats_in_round(all));
+        let placed = signs.into_iter().filter_map(|(seat, sign)| {
+            self.authors.place_of(seat).map(|place| PlacedBeat { place, sign })
+        });
+        let mut placed: Vec<PlacedBeat> = placed.collect();
+        placed.sort_unstable_by_key(|beat| beat.place);
+        placed
+    }
+
+    /// Signs of life of all others, or of those that are fresh and were told least.
+    fn signs(&mut self, to: Seat, room: usize) -> Vec<(Seat, Sign)> {
         let preferred = self.preferred();
         let mut ranked: Vec<(u64, Seat)> = Vec::with_capacity(self.liveness.living_count());
         for (seat, seen) in self.liveness.living() {
@@ -239,21 +286,16 @@ impl Mesh {
             ranked.select_nth_unstable(room);
             ranked.truncate(room);
         }
-        let mut beats = Vec::with_capacity(ranked.len());
+        let mut signs = Vec::with_capacity(ranked.len());
         for (_, seat) in ranked {
             let author = self.authors.at(seat);
-            let id = cut(author.id, wide);
-            let (sequence, unique) = (author.sequence(), self.authors.lookup(id, wide));
+            let (life, sequence) = (author.incarnation.counter, author.sequence());
             let Some(seen) = self.liveness.get_mut(seat) else { continue };
             seen.told = seen.told.saturating_add(1);
             let age = self.clock.since(seen.fresh_at);
-            match (unique, Beat::new(id, seen.heartbeat, sequence, age)) {
-                (Lookup::One(_), Some(beat)) => beats.push(beat),
-                (Lookup::Ambiguous, Some(_)) => self.told.introduce(seat),
-                (Lookup::Ambiguous | Lookup::Unknown, _) | (Lookup::One(_), None) => {}
-            }
+            signs.extend(Sign::new(life, seen.heartbeat, sequence, age).map(|sign| (seat, sign)));
         }
-        Beats { wide, beats }
+        signs
     }
 
     /// Robots whose news matters most here: whom this robot guards, and the coordinator.

@@ -109,7 +109,7 @@ impl Measure {
     }
 
     /// Quiet is no event, since it is usual on a lossy link: it is read from the meshes.
-    fn look_at_quiet(&mut self, fleet: &Fleet) {
+    pub(crate) fn look_at_quiet(&mut self, fleet: &Fleet) {
         for kill in &mut self.kills {
             let target = &fleet.robots[kill.robot].id;
             for (observer, noted) in kill.quiet.iter_mut().enumerate().filter(|(_, noted)| !**noted)

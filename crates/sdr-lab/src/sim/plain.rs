@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use sdr_core::{record::RecordKind, time::Instant};
+use sdr_core::{mesh::SECTION_NAMES, record::RecordKind, time::Instant};
 
 use super::{
     Chance, Fault, Fleet, Incident, Record, Setup, Weather, fault::DiskFate, fleet::BEGIN,
@@ -25,6 +25,8 @@ const OUTAGE_SHARE: usize = 5;
 const DOWN: Duration = Duration::from_secs(40);
 /// From its return to the next kill.
 const BETWEEN_KILLS: Duration = Duration::from_secs(20);
+/// After a kill it is looked so often who is quiet.
+const QUIET_LOOKS: Duration = Duration::from_millis(50);
 /// Markers measured in one run.
 const MARKERS: usize = 8;
 /// Time until the next marker.
@@ -152,6 +154,7 @@ fn idle_bytes(run: &mut Run, time: Duration) {
         fleet.robots.iter().map(super::Robot::guard_bytes).collect()
     };
     let before = (run.fleet.tally.sent_bytes.clone(), guards(&run.fleet));
+    let sections_before = sections(&run.fleet);
     run.advance(time);
     let seconds = time.as_secs_f64().max(0.001);
     let after = (run.fleet.tally.sent_bytes.clone(), guards(&run.fleet));
@@ -161,6 +164,21 @@ fn idle_bytes(run: &mut Run, time: Duration) {
         run.measure.record.bytes_per_robot_s.push(all.saturating_sub(guard) as f64 / seconds);
         run.measure.record.guard_bytes_per_robot_s.push(guard as f64 / seconds);
     }
+    let robot_seconds = seconds * run.fleet.robots.len() as f64;
+    let sums = sections(&run.fleet).into_iter().zip(sections_before);
+    for (name, (after, before)) in SECTION_NAMES.iter().zip(sums) {
+        let rate = after.saturating_sub(before) as f64 / robot_seconds;
+        run.measure.record.section_bytes_per_robot_s.entry(name).or_default().push(rate);
+    }
+}
+
+/// Bytes of the whole fleet by section.
+fn sections(fleet: &Fleet) -> [u64; SECTION_NAMES.len()] {
+    let mut all = [0; SECTION_NAMES.len()];
+    for robot in &fleet.robots {
+        all.iter_mut().zip(robot.section_bytes()).for_each(|(sum, bytes)| *sum += bytes);
+    }
+    all
 }
 
 /// Small systems deployed anywhere; how long until 99 % of the robots hold each.
@@ -217,7 +235,9 @@ fn kills(run: &mut Run, chance: &mut Chance, end: Instant) {
         let lost = number % 2 == 1;
         let disk = if lost { DiskFate::Lost } else { DiskFate::Kept };
         run.fleet.strike(&Fault::Crash { robot, down: None, disk });
-        run.advance(DOWN);
+        let watched = run.fleet.gone_after();
+        see_it_fall_quiet(run, watched);
+        run.advance(DOWN.saturating_sub(watched));
         run.measure.revive(robot);
         if lost {
             run.measure.join(&run.fleet, robot);
@@ -225,5 +245,14 @@ fn kills(run: &mut Run, chance: &mut Chance, end: Instant) {
         run.fleet.switch_on(robot);
         run.advance(BETWEEN_KILLS);
         number += 1;
+    }
+}
+
+/// Lets time pass after a kill, and looks often: quiet is no event.
+fn see_it_fall_quiet(run: &mut Run, time: Duration) {
+    let end = run.fleet.now + time;
+    while run.fleet.now < end {
+        run.advance(QUIET_LOOKS.min(end.since(run.fleet.now)));
+        run.measure.look_at_quiet(&run.fleet);
     }
 }

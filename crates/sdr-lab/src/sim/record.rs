@@ -1,5 +1,7 @@
 //! Samples of runs, and the figures made of them.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::Violation;
@@ -27,6 +29,8 @@ pub struct Record {
     pub bytes_per_robot_s: Vec<f64>,
     /// The same of guard beats.
     pub guard_bytes_per_robot_s: Vec<f64>,
+    /// The fleet's mean of each section of the datagrams, by run.
+    pub section_bytes_per_robot_s: BTreeMap<&'static str, Vec<f64>>,
     /// Bytes to and from a robot with an empty disk until it knew everything.
     pub join_bytes: Vec<f64>,
     /// From the first start to everything running, ms.
@@ -88,6 +92,8 @@ pub struct Figures {
     pub bytes_per_robot_s: Rate,
     /// Guard beats alone.
     pub guard_bytes_per_robot_s: Rate,
+    /// The mean robot's by section of the datagrams, guard beats too, UDP, IP and seal not.
+    pub section_bytes_per_robot_s: BTreeMap<&'static str, f64>,
     /// The largest join with an empty disk.
     pub join_bytes: Option<f64>,
     /// Start to everything running, the slowest.
@@ -119,6 +125,9 @@ impl Record {
         self.coordinator_gap_ms.extend(other.coordinator_gap_ms);
         self.bytes_per_robot_s.extend(other.bytes_per_robot_s);
         self.guard_bytes_per_robot_s.extend(other.guard_bytes_per_robot_s);
+        for (name, rates) in other.section_bytes_per_robot_s {
+            self.section_bytes_per_robot_s.entry(name).or_default().extend(rates);
+        }
         self.join_bytes.extend(other.join_bytes);
         self.converged_ms.extend(other.converged_ms);
         self.replans += other.replans;
@@ -142,6 +151,7 @@ impl Record {
             coordinator_gap_ms: spread(&self.coordinator_gap_ms),
             bytes_per_robot_s: rate(&self.bytes_per_robot_s),
             guard_bytes_per_robot_s: rate(&self.guard_bytes_per_robot_s),
+            section_bytes_per_robot_s: self.section_means(),
             join_bytes: greatest(&self.join_bytes),
             converged_ms: greatest(&self.converged_ms),
             replans: self.replans,
@@ -151,6 +161,13 @@ impl Record {
             violations: self.violations.clone(),
             trace_hash: format!("{:016x}", self.trace_hash),
         }
+    }
+
+    fn section_means(&self) -> BTreeMap<&'static str, f64> {
+        let mean = |rates: &[f64]| rates.iter().sum::<f64>() / rates.len().max(1) as f64;
+        let means = self.section_bytes_per_robot_s.iter();
+        let means = means.map(|(name, rates)| (*name, tenths(mean(rates), 10.0)));
+        means.filter(|(_, mean)| *mean > 0.0).collect()
     }
 }
 

@@ -185,6 +185,11 @@ impl Robot {
         traffic.guard_bytes + traffic.guard * FRAME_BYTES as u64
     }
 
+    /// Bytes sent since its start, by section of the mesh's datagrams, before the seal.
+    pub fn section_bytes(&self) -> [u64; sdr_core::mesh::SECTION_NAMES.len()] {
+        self.brain.as_ref().map(|brain| brain.mesh().traffic().sections).unwrap_or_default()
+    }
+
     /// Longest datagram so far, bytes.
     pub fn datagram_bytes_max(&self) -> usize {
         self.datagram_bytes_max

@@ -39,15 +39,28 @@ fn any_stamp() -> impl Strategy<Value = Stamp> {
 }
 
 fn any_beats() -> impl Strategy<Value = Beats> {
-    let beat = (any::<u32>(), 0u16..2048, 0u8..64, 0u8..128);
+    let beat = (any::<u32>(), any::<bool>(), 0u16..1024, 0u8..64, 0u8..128);
     (any::<bool>(), proptest::collection::vec(beat, 0..60)).prop_map(|(wide, beats)| {
-        let beat = |(id, heartbeat, sequence, age)| Beat {
+        let beat = |(id, odd, heartbeat, sequence, age)| Beat {
             id: wire::cut(id, wide),
-            heartbeat,
-            sequence,
-            age,
+            sign: Sign { odd, heartbeat, sequence, age },
         };
         Beats { wide, beats: beats.into_iter().map(beat).collect() }
+    })
+}
+
+/// Places near each other and far apart, so that there are runs.
+fn any_pulse() -> impl Strategy<Value = Pulse> {
+    let sign = (any::<bool>(), 0u16..1024, 0u8..64, 0u8..128);
+    let place = prop_oneof![0u16..40, any::<u16>(), 65_530u16..=65_535];
+    let beats = proptest::collection::btree_map(place, sign, 0..60);
+    (any::<(u32, u32, u32)>(), beats).prop_map(|((fleet, roster, names), beats)| {
+        let beat = |(place, (odd, heartbeat, sequence, age))| PlacedBeat {
+            place,
+            sign: Sign { odd, heartbeat, sequence, age },
+        };
+        let beats = beats.into_iter().map(beat).collect();
+        Pulse { summary: Summary { fleet, roster }, names, beats }
     })
 }
 
@@ -77,6 +90,7 @@ fn any_section() -> impl Strategy<Value = Section> {
         any_mark().prop_map(Section::Link),
         Just(Section::Ping),
         any_beats().prop_map(Section::Beats),
+        any_pulse().prop_map(Section::Pulse),
         any::<(u32, u32)>().prop_map(|(fleet, roster)| Section::Summary(Summary { fleet, roster })),
         stamps().prop_map(Section::Stamps),
         (any::<bool>(), ids()).prop_map(|(wide, ids)| Section::AskStamps(AskStamps { wide, ids })),

@@ -1,8 +1,8 @@
-//! The datagram: header, then sections of (tag, length, body). Version 2.
+//! The datagram: header, then sections of (tag, length, body). Version 3.
 //!
 //! ```text
 //! 0  "SD"            2  magic
-//! 2  version         1  2
+//! 2  version         1  3
 //! 3  fleet           4  FNV-1a of the fleet's name, folded, little endian
 //! 7  sender          1 + n (n <= 32)
 //!    incarnation     varint counter, 4 bytes nonce
@@ -21,11 +21,11 @@ use alloc::vec::Vec;
 
 use thiserror::Error;
 
-pub use beat::Beat;
+pub use beat::{Beat, PlacedBeat, Sign};
 pub(super) use beat::{beat_len, cut, last_of};
 pub use section::{
-    AskNews, AskStamps, AuthorDelta, Beats, Echo, FleetEntries, FleetNodes, LinkMark, News,
-    RosterPiece, Section, Stamp, Summary,
+    AskNews, AskStamps, AuthorDelta, Beats, Echo, FleetEntries, FleetNodes, LinkMark, News, Pulse,
+    RosterPiece, SECTION_NAMES, Section, Stamp, Summary,
 };
 
 use super::Incarnation;
@@ -41,7 +41,7 @@ const HEADER_BYTES_MAX: usize = 2 + 1 + 4 + 1 + NAME_BYTES_MAX + 10 + 4 + 10 + 1
 /// Longest section with its tag and length that fits a datagram of any sender.
 pub(super) const SECTION_BYTES_MAX: usize = DATAGRAM_BYTES_MAX - HEADER_BYTES_MAX - 20;
 const MAGIC: [u8; 2] = *b"SD";
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 
 /// Why a datagram was dropped.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -104,6 +104,24 @@ impl Header {
         put_varint(self.heartbeat, &mut bytes);
         put_varint(self.sequence, &mut bytes);
         bytes
+    }
+
+    /// Adds the bytes of a datagram of this header to `counts`, by tag; the header's to 0.
+    pub(super) fn tally(&self, datagram: &[u8], counts: &mut [u64; SECTION_NAMES.len()]) {
+        let begin = self.encode().len().min(datagram.len());
+        counts[0] += begin as u64;
+        let mut reader = Reader { bytes: datagram, at: begin };
+        while let Ok(tag) = reader.byte() {
+            let Ok(length) = reader.varint() else { return };
+            let before = reader.at;
+            let taken = usize::try_from(length).ok().and_then(|length| reader.take(length).ok());
+            let frame = 1 + varint_len(length);
+            let count = counts.get_mut(usize::from(tag));
+            count.into_iter().for_each(|count| *count += (reader.at - before + frame) as u64);
+            if taken.is_none() {
+                return;
+            }
+        }
     }
 
     /// Packs `sections`, in order, into as few datagrams as hold them; one that fits no
@@ -171,6 +189,12 @@ fn put_varint(value: u64, bytes: &mut Vec<u8>) {
         rest >>= 7;
     }
     bytes.push(u8::try_from(rest).unwrap_or(0));
+}
+
+/// Bytes of a varint.
+pub(super) fn varint_len(value: u64) -> usize {
+    let bits = u64::BITS - (value | 1).leading_zeros();
+    usize::try_from(bits.div_ceil(7)).unwrap_or(10)
 }
 
 struct Reader<'a> {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Reader, WireError,
-    beat::{BEATS_MAX, Beat},
+    beat::{BEATS_MAX, Beat, PlacedBeat, decode_placed, encode_placed},
 };
 use crate::{
     id::RobotId,
@@ -25,6 +25,8 @@ pub enum Section {
     Beats(Beats),
     /// What the sender holds in all.
     Summary(Summary),
+    /// Both at once, for those who know the same robots.
+    Pulse(Pulse),
     /// How far some authors are known, by name.
     Stamps(Vec<Stamp>),
     /// Asks for stamps of robots by id.
@@ -89,6 +91,17 @@ pub struct Summary {
     pub fleet: u32,
     /// Hash over the robots known, with their incarnations.
     pub roster: u32,
+}
+
+/// A summary, and signs of life by place among all names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pulse {
+    /// What the sender holds in all.
+    pub summary: Summary,
+    /// Hash over the names of the robots known; who has another cannot read the beats.
+    pub names: u32,
+    /// By growing place.
+    pub beats: Vec<PlacedBeat>,
 }
 
 /// How far the sender's knowledge of one author goes.
@@ -201,6 +214,31 @@ const TAG_FLEET_WANTED: u8 = 15;
 const TAG_FLEET_RECORDS: u8 = 16;
 const TAG_PEERS: u8 = 17;
 const TAG_FLEET_NEWS: u8 = 18;
+const TAG_PULSE: u8 = 19;
+
+/// What the sections are called, by tag; 0 stands for headers.
+pub const SECTION_NAMES: [&str; 20] = [
+    "header",
+    "link",
+    "ping",
+    "beats",
+    "beats-wide",
+    "summary",
+    "stamps",
+    "ask-stamps",
+    "ask-records",
+    "author-delta",
+    "ask-news",
+    "news",
+    "roster",
+    "fleet-nodes",
+    "fleet-entries",
+    "fleet-wanted",
+    "fleet-records",
+    "peers",
+    "fleet-news",
+    "pulse",
+];
 
 impl Section {
     /// The tag and the body.
@@ -217,10 +255,12 @@ impl Section {
                 beats.beats.iter().for_each(|beat| beat.encode(beats.wide, &mut body));
                 (tag, body)
             }
-            Self::Summary(summary) => {
-                let mut body = summary.fleet.to_le_bytes().to_vec();
-                body.extend_from_slice(&summary.roster.to_le_bytes());
-                (TAG_SUMMARY, body)
+            Self::Summary(summary) => (TAG_SUMMARY, summary.encode()),
+            Self::Pulse(pulse) => {
+                let mut body = pulse.summary.encode();
+                body.extend_from_slice(&pulse.names.to_le_bytes());
+                encode_placed(&pulse.beats, &mut body);
+                (TAG_PULSE, body)
             }
             Self::Stamps(stamps) => (TAG_STAMPS, plain(stamps)),
             Self::AskStamps(ask) => (TAG_ASK_STAMPS, plain(ask)),
@@ -262,9 +302,11 @@ impl Section {
                 }
                 Self::Beats(Beats { wide, beats })
             }
-            TAG_SUMMARY => Self::Summary(Summary {
-                fleet: u32::from_le_bytes(reader.array()?),
-                roster: u32::from_le_bytes(reader.array()?),
+            TAG_SUMMARY => Self::Summary(Summary::decode(&mut reader)?),
+            TAG_PULSE => Self::Pulse(Pulse {
+                summary: Summary::decode(&mut reader)?,
+                names: u32::from_le_bytes(reader.array()?),
+                beats: decode_placed(tag, &mut reader)?,
             }),
             TAG_STAMPS => Self::Stamps(plain(tag, body)?),
             TAG_ASK_STAMPS => Self::AskStamps(plain(tag, body)?),
@@ -282,6 +324,19 @@ impl Section {
             _ => return Ok(None),
         };
         Ok(Some(section))
+    }
+}
+
+impl Summary {
+    fn encode(self) -> Vec<u8> {
+        let mut body = self.fleet.to_le_bytes().to_vec();
+        body.extend_from_slice(&self.roster.to_le_bytes());
+        body
+    }
+
+    fn decode(reader: &mut Reader<'_>) -> Result<Self, WireError> {
+        let fleet = u32::from_le_bytes(reader.array()?);
+        Ok(Self { fleet, roster: u32::from_le_bytes(reader.array()?) })
     }
 }
 
