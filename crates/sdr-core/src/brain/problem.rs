@@ -6,7 +6,7 @@ use super::{Brain, systems::SystemNow};
 use crate::{
     allocate::{Item, Pair, Problem, RobotOffer, Settled, Tier, Wire},
     id::{ComponentKey, Name, RobotId},
-    report::{InstanceReport, Report},
+    report::InstanceReport,
     spec::{ComponentSpec, Needs, launch_hash},
     units::Bytes,
 };
@@ -145,8 +145,7 @@ impl Brain {
         let mut pairs: BTreeMap<(RobotId, RobotId), Pair> = BTreeMap::new();
         for robot in robots {
             let Some(author) = self.mesh.authors().author(robot) else { continue };
-            for report in author.reports() {
-                let Report::Link(other, link) = report else { continue };
+            for (other, link) in author.links() {
                 let (a, b) = if robot < other { (robot, other) } else { (other, robot) };
                 let pair = pairs.entry((a.clone(), b.clone())).or_insert_with(|| Pair {
                     a: a.clone(),
@@ -180,16 +179,7 @@ impl Brain {
         if *robot == self.me {
             return self.instances.keys().map(|id| self.own_report(*id)).collect();
         }
-        let Some(author) = self.mesh.authors().author(robot) else { return Vec::new() };
-        let instances = author.reports().filter_map(|report| match report {
-            Report::Instance(instance) => Some(instance.clone()),
-            Report::Facts(_)
-            | Report::Host(_)
-            | Report::Link(..)
-            | Report::Condition(_)
-            | Report::Succession(_)
-            | Report::Homeless(_) => None,
-        });
-        instances.collect()
+        let author = self.mesh.authors().author(robot).into_iter();
+        author.flat_map(|author| author.instances()).cloned().collect()
     }
 }

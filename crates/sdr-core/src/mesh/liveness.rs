@@ -124,11 +124,11 @@ impl Liveness {
         said_at: Instant,
         now: Instant,
     ) -> Heard {
-        let (quiet_after, gone_after) = (self.quiet(), self.gone());
-        let Some(seen) = self.seen.get_mut(seat.index()) else { return Heard::Nothing };
-        if heartbeat <= seen.heartbeat {
+        if self.seen.get(seat.index()).is_none_or(|seen| heartbeat <= seen.heartbeat) {
             return Heard::Nothing;
         }
+        let (quiet_after, gone_after) = (self.quiet(), self.gone());
+        let Some(seen) = self.seen.get_mut(seat.index()) else { return Heard::Nothing };
         let gap = now.since(seen.fresh_at);
         seen.heartbeat = heartbeat;
         seen.told = 0;

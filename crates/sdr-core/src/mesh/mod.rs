@@ -19,6 +19,8 @@
 
 mod author;
 mod author_table;
+mod commons;
+mod fact;
 mod fleet_table;
 mod fleet_tree;
 mod inquiry;
@@ -31,6 +33,7 @@ mod peers;
 mod receive;
 mod repair;
 mod round;
+mod saying;
 mod spread;
 #[cfg(test)]
 mod tests;
@@ -42,12 +45,15 @@ use alloc::{
 };
 use core::{net::SocketAddr, time::Duration};
 
-pub use author::{Author, AuthorKey, Incarnation};
+pub use author::{Author, Incarnation};
 pub use author_table::AuthorTable;
-pub use fleet_table::{FleetRecord, FleetTable, Merge};
+pub use commons::Commons;
+pub use fact::{Fact, Facts, FleetRecord};
+pub use fleet_table::{FleetTable, Merge, TableChange};
 pub use liveness::Standing;
 pub use lives::Memory;
 pub use news::{Inquiry, MeshConfig, MeshCounters, MeshNews, MeshTraffic, Push};
+pub use saying::{AuthorKey, Saying, Spoken};
 pub use wire::{
     AskNews, AskStamps, AuthorDelta, Beat, Beats, DATAGRAM_BYTES_MAX, Datagram, Echo, FleetEntries,
     FleetNodes, Header, LinkMark, News, RosterPiece, SEAL_BYTES_MAX, Section, Stamp, Summary,
@@ -60,6 +66,7 @@ use crate::{
     report::{LinkReport, Report},
     rng::Rng,
     time::Instant,
+    units::Permille,
 };
 use author_table::{Admission, Seat};
 use inquiry::Inquiries;
@@ -122,7 +129,7 @@ impl Mesh {
         let mut liveness = Liveness::new(config.gone_after, config.period, now);
         liveness.reset(Seat::OWN);
         Self {
-            authors: AuthorTable::new(config.robot.clone(), own),
+            authors: AuthorTable::new(config.robot.clone(), own, fleet.commons()),
             liveness,
             links: Links::default(),
             peers: Peers::new(known, config.listen),
@@ -274,6 +281,12 @@ impl Mesh {
         &self.fleet
     }
 
+    /// What changed in the fleet table since the last call, for the disk; `None` when it is
+    /// too much to tell apart.
+    pub fn take_change(&mut self) -> Option<TableChange> {
+        self.fleet.take_change()
+    }
+
     /// What is judged of `robot`; this robot itself is alive.
     pub fn standing(&self, robot: &RobotId) -> Standing {
         match self.authors.seat(robot) {
@@ -310,10 +323,10 @@ impl Mesh {
         }
     }
 
-    /// How many other robots were heard without a relay in the last `within`.
-    pub fn heard_directly(&self, now: Instant, within: Duration) -> usize {
+    /// Whether another robot was heard without a relay in the last `within`.
+    pub fn hears_somebody(&self, now: Instant, within: Duration) -> bool {
         let recent = |at: Instant| now.since(at) <= within;
-        self.liveness.all().filter(|(_, seen)| seen.direct_at.is_some_and(recent)).count()
+        self.liveness.all().any(|(_, seen)| seen.direct_at.is_some_and(recent))
     }
 
     /// What came of the last [`Mesh::ask_about`] this robot, for ten seconds.
@@ -332,12 +345,38 @@ impl Mesh {
         self.liveness.living().map(|(seat, _)| &self.authors.at(seat).robot)
     }
 
+    /// How many other robots are alive or quiet.
+    pub fn alive_count(&self) -> usize {
+        self.liveness.living_count()
+    }
+
+    /// Robots that a link was measured to.
+    pub fn linked(&self) -> impl Iterator<Item = &RobotId> {
+        self.links.heard().map(|seat| &self.authors.at(seat).robot)
+    }
+
     /// Links of this robot, measured by it.
     pub fn links(&self) -> impl Iterator<Item = (&RobotId, LinkReport)> {
-        let cycle = self.config.period * u32::try_from(self.authors.count()).unwrap_or(u32::MAX);
-        let silent_before = self.clock - (cycle * 6).max(self.config.gone_after / 2);
-        let reports = self.links.reports(self.clock, silent_before);
+        let reports = self.links.reports(self.clock, self.silent_before());
         reports.map(|(seat, report)| (&self.authors.at(seat).robot, report))
+    }
+
+    /// What was measured of the link to `robot`, as far as it was heard.
+    pub fn link(&self, robot: &RobotId) -> Option<LinkReport> {
+        let seat = self.authors.seat(robot)?;
+        self.links.report(seat, self.clock, self.silent_before())
+    }
+
+    /// The loss of that link alone.
+    pub fn loss_to(&self, robot: &RobotId) -> Option<Permille> {
+        let seat = self.authors.seat(robot)?;
+        self.links.loss(seat, self.clock, self.silent_before())
+    }
+
+    /// A living robot that was not heard directly since then cannot be heard.
+    fn silent_before(&self) -> Instant {
+        let cycle = self.config.period * u32::try_from(self.authors.count()).unwrap_or(u32::MAX);
+        self.clock - (cycle * 6).max(self.config.gone_after / 2)
     }
 
     /// Addresses heard so far.

@@ -38,7 +38,13 @@ impl Mesh {
 
     pub(super) fn take_in(&mut self, from: SocketAddr, datagram: Datagram) {
         let header = datagram.header;
-        let seat = match self.admit(&header.from, header.incarnation) {
+        let known = self.peers.seat_at(from).filter(|seat| {
+            let author = self.authors.at(*seat);
+            author.incarnation == header.incarnation && author.robot == header.from
+        });
+        let admission = known.map(Admission::Known);
+        let admission = admission.unwrap_or_else(|| self.admit(&header.from, header.incarnation));
+        let seat = match admission {
             Admission::Outdated(seat) => {
                 self.counters.stale += 1;
                 return self.correct(from, seat);
@@ -92,7 +98,7 @@ impl Mesh {
             Section::Stamps(stamps) => stamps.into_iter().for_each(|stamp| self.take_stamp(stamp)),
             Section::AskStamps(ask) => self.answer_stamps(&ask, answer),
             Section::AskRecords(asks) => self.answer_records(&asks, answer),
-            Section::AuthorDelta(delta) => self.learn(&delta),
+            Section::AuthorDelta(delta) => self.learn(delta),
             Section::AskNews(ask) => self.answer_inquiry(&ask, answer),
             Section::News(news) => self.take_news(seat, news),
             Section::Roster(piece) => self.answer_roster(&piece, answer),

@@ -12,11 +12,7 @@ use super::{
     author_table::{Lookup, Seat},
     wire::{beat_len, cut},
 };
-use crate::{
-    id::RobotId,
-    record::{FleetValue, RecordKind},
-    time::Instant,
-};
+use crate::{id::RobotId, time::Instant};
 
 /// Fleets with fewer others greet two of them each round.
 const SMALL_FLEET: usize = 8;
@@ -258,10 +254,7 @@ impl Mesh {
 
     /// Robots whose news matters most here: whom this robot guards, and the coordinator.
     pub(super) fn preferred(&self) -> BTreeSet<Seat> {
-        let holder = match self.fleet.get(RecordKind::ROLE, "") {
-            Some((_, FleetValue::Role(role))) => self.authors.seat(&role.holder),
-            Some(_) | None => None,
-        };
+        let holder = self.fleet.role().and_then(|role| self.authors.seat(&role.holder));
         let guarded = self.guard.robots().filter_map(|robot| self.authors.seat(robot));
         guarded.chain(holder).collect()
     }

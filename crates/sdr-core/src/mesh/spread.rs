@@ -162,19 +162,19 @@ impl Mesh {
         deltas
     }
 
-    pub(super) fn learn(&mut self, delta: &AuthorDelta) {
+    pub(super) fn learn(&mut self, delta: AuthorDelta) {
         if delta.robot == self.config.robot {
             return;
         }
         let admission = self.admit(&delta.robot, delta.incarnation);
         let Some(seat) = admission.seat() else { return };
-        let author = self.authors.at_mut(seat);
-        let before = author.sequence();
+        let before = self.authors.at(seat).sequence();
         if before > 0 && planted::is(Defect::StaleReports) {
             return;
         }
-        let learned = author.learn(delta);
-        let advanced = author.sequence() > before;
+        let robot = delta.robot.clone();
+        let learned = self.authors.learn(seat, delta);
+        let advanced = self.authors.at(seat).sequence() > before;
         self.counters.refused += learned.refused;
         if learned.gap {
             self.repair.want(seat, self.clock);
@@ -186,7 +186,7 @@ impl Mesh {
             }
         }
         if learned.records {
-            self.news.push_back(MeshNews::Report(delta.robot.clone()));
+            self.news.push_back(MeshNews::Report(robot, learned.spoken));
         }
     }
 

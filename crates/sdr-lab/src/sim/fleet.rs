@@ -1,6 +1,6 @@
 //! The fleet in virtual time: robots, radio, and what is due.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use sdr_core::{
     api::DeployAnswer,
@@ -17,6 +17,7 @@ use super::{
     chance::Chance,
     disk::Written,
     due::Due,
+    pool::Pool,
     process::Process,
     queue::Queue,
     robot::{Robot, body},
@@ -75,6 +76,8 @@ pub struct Fleet {
     pub answers: Vec<(usize, Result<DeployAnswer, String>)>,
     /// Faults that struck, in words, when they are kept.
     pub struck: Vec<(Instant, String)>,
+    /// What all brains hold in common, once.
+    pool: Arc<Pool>,
     gone_after: Duration,
     steps: u64,
 }
@@ -116,6 +119,7 @@ impl Fleet {
             told: Vec::new(),
             answers: Vec::new(),
             struck: Vec::new(),
+            pool: Arc::new(Pool::default()),
             steps: 0,
             setup,
         }
@@ -218,7 +222,7 @@ impl Fleet {
     pub fn switch_on(&mut self, robot: usize) {
         // Monotonic clocks begin anew with their machine, anywhere.
         let shown = Instant::from_millis(1000 + self.chance.bits() % 1_000_000_000);
-        self.robots[robot].start(self.now, shown, self.setup.robots);
+        self.robots[robot].start(self.now, shown, self.setup.robots, &self.pool);
         let disk_kept = self.robots[robot].disk.held().is_some();
         self.disturb(self.now);
         self.sights.push(Sight::On { robot, disk_kept });
