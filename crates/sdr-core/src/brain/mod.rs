@@ -314,6 +314,11 @@ impl Brain {
         self.is_coordinator()
     }
 
+    /// The robot whose brain it is.
+    pub fn robot(&self) -> &RobotId {
+        &self.me
+    }
+
     /// What this robot knows of the fleet, to look at.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh

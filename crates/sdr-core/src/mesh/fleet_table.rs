@@ -1,16 +1,13 @@
 //! What the fleet agrees on: key -> (version, value), merged by greatest version.
 
-use alloc::{
-    collections::{BTreeMap, BTreeSet},
-    sync::Arc,
-    vec::Vec,
-};
+use alloc::{collections::BTreeSet, sync::Arc, vec::Vec};
 
 use super::{
     commons::Commons,
     fact::{Fact, Facts, FleetRecord, key_hash},
+    fact_index::ByHash,
     fleet_tree::{FleetTree, range_of},
-    wire::FleetEntries,
+    wire::{FleetEntries, RecordRef},
 };
 use crate::{
     order::Version,
@@ -40,8 +37,7 @@ pub enum Merge {
 #[derive(Clone, Debug, Default)]
 pub struct FleetTable {
     facts: Facts,
-    /// By key hash; the second number tells keys of one hash apart.
-    by_hash: BTreeMap<(u32, u32), Arc<Fact>>,
+    by_hash: ByHash,
     tree: FleetTree,
     /// Looked at with every input.
     role: Option<Arc<Fact>>,
@@ -139,6 +135,13 @@ impl FleetTable {
             None if self.facts.len() >= RECORDS_MAX => Merge::Refused,
             Some(_) | None => Merge::News,
         }
+    }
+
+    /// Whether a record that came says what is known.
+    pub(super) fn holds(&self, record: &RecordRef<'_>) -> bool {
+        let hash = key_hash(record.kind(), record.name());
+        let known = self.find(hash, record.kind(), record.name());
+        known.is_some_and(|known| record.is(known)) && !planted::is(Defect::EndlessEcho)
     }
 
     /// The value under a key.
@@ -309,35 +312,16 @@ impl FleetTable {
     }
 
     fn find(&self, hash: u32, kind: RecordKind, name: &str) -> Option<&Arc<Fact>> {
-        let is_it = |fact: &&Arc<Fact>| fact.key().kind == kind && fact.key().name == name;
-        let first = self.by_hash.get(&(hash, 0)).filter(is_it);
-        first.or_else(|| {
-            let others = self.by_hash.range((hash, 1)..=(hash, u32::MAX));
-            others.map(|(_, fact)| fact).find(is_it)
-        })
+        self.by_hash.find(hash, |fact| fact.key().kind == kind && fact.key().name == name)
     }
 
     fn in_range(&self, low: u32, high: u32) -> impl Iterator<Item = &Fact> {
-        let facts = (low <= high).then(|| self.by_hash.range((low, 0)..=(high, u32::MAX)));
-        facts.into_iter().flatten().map(|(_, fact)| &**fact)
-    }
-
-    /// The place of a key among those of its hash: its own, or the first that is free.
-    fn place(&self, fact: &Fact) -> (u32, u32) {
-        let alike = self.by_hash.range((fact.hash(), 0)..=(fact.hash(), u32::MAX));
-        let mut free = 0;
-        for (place, held) in alike {
-            if held.key() == fact.key() {
-                return *place;
-            }
-            free = place.1.saturating_add(1);
-        }
-        (fact.hash(), free)
+        self.by_hash.range(low, high).map(|fact| &**fact)
     }
 
     fn put(&mut self, fact: Arc<Fact>) {
         self.tree.toggle(fact.hash(), fact.stamp());
-        self.by_hash.insert(self.place(&fact), Arc::clone(&fact));
+        self.by_hash.put(&fact);
         if fact.key().kind == RecordKind::ROLE && fact.key().name.is_empty() {
             self.role = Some(Arc::clone(&fact));
         }
@@ -370,7 +354,7 @@ impl FleetTable {
     fn drop_fact(&mut self, key: &FleetKey) {
         if let Some(fact) = self.facts.remove(key) {
             self.tree.toggle(fact.hash(), fact.stamp());
-            self.by_hash.remove(&self.place(&fact));
+            self.by_hash.remove(&fact);
             self.note_unsaved(&fact);
         }
     }

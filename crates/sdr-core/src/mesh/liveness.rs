@@ -70,6 +70,8 @@ pub(super) struct Liveness {
     period: Duration,
     seen: Vec<Seen>,
     living: usize,
+    /// Grows when a robot begins or ceases to live.
+    edition: u64,
     /// Mean and mean deviation of how old news is when fresher comes, microseconds.
     gap_mean: u64,
     gap_deviation: u64,
@@ -86,6 +88,7 @@ impl Liveness {
             period,
             seen: Vec::new(),
             living: 0,
+            edition: 0,
             gap_mean: 0,
             gap_deviation: 0,
             gaps_count: 0,
@@ -149,6 +152,7 @@ impl Liveness {
                 seen.standing = Standing::Alive;
                 let quiet_at = seen.fresh_at + quiet_after;
                 self.living += 1;
+                self.edition += 1;
                 self.wake_at(quiet_at, now);
                 Heard::Return
             }
@@ -193,6 +197,7 @@ impl Liveness {
                 Standing::Quiet => {
                     seen.standing = Standing::Gone;
                     self.living -= 1;
+                    self.edition += 1;
                     fallen.push((Seat::at(index), Standing::Gone));
                     continue;
                 }
@@ -267,6 +272,10 @@ impl Liveness {
     /// How many others are alive or quiet.
     pub(super) fn living_count(&self) -> usize {
         self.living
+    }
+
+    pub(super) fn edition(&self) -> u64 {
+        self.edition
     }
 
     pub(super) fn next_deadline(&self) -> Option<Instant> {

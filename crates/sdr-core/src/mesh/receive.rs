@@ -74,7 +74,7 @@ impl Mesh {
         }
         if is_new && self.liveness.is_living(seat) {
             answer.extend(self.greeting(seat));
-            let peers = self.peers.pick(&self.living_seats(), ADDRESSES_TOLD, &mut self.rng);
+            let peers = self.pick(ADDRESSES_TOLD, &[]);
             answer.push(Section::Peers(peers));
         }
         if !answer.is_empty() {
@@ -129,7 +129,7 @@ impl Mesh {
         }
         if silence.is_some() {
             // others may be close to their patience with this robot
-            let peers = self.peers.pick(&self.living_seats(), RETURN_PEERS, &mut self.rng);
+            let peers = self.pick(RETURN_PEERS, &[]);
             for peer in peers {
                 self.send(peer, Vec::new());
             }

@@ -141,7 +141,7 @@ impl Mesh {
         self.greet_stray(living.is_empty());
         self.ping_quiet();
         if self.liveness.silence(self.clock) > LONELY_AFTER {
-            for peer in self.peers.pick(&living, LONELY_PEERS, &mut self.rng) {
+            for peer in self.pick(LONELY_PEERS, &[]) {
                 self.send(peer, vec![Section::Ping]);
             }
         }

@@ -52,7 +52,7 @@ pub use chance::Chance;
 pub use chaos::{CONVERGED_WITHIN, Outcome, Telling};
 pub use draw::Scenario;
 pub use fault::{ClockFate, DiskFate, Fault, Incident};
-pub use fleet::{ActiveProcess, Fleet};
+pub use fleet::{ActiveProcess, Fleet, Probe};
 pub use plain::Plain;
 pub use process::{Behaviour, Process};
 pub use record::{Figures, Rate, Record, Spread};
