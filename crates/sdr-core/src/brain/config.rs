@@ -58,6 +58,13 @@ impl BrainConfig {
     }
 }
 
+impl BrainConfig {
+    /// How many addresses to begin with are not this robot's own.
+    pub(super) fn seeds_of_others(&self) -> usize {
+        self.seeds.iter().filter(|seed| Some(**seed) != self.listen).count()
+    }
+}
+
 /// Makes a recovery engine from a policy; the error is for people.
 pub type MakeRecovery =
     Box<dyn Fn(&PolicyBytes) -> Result<Box<dyn Recovery + Send>, String> + Send>;

@@ -187,10 +187,9 @@ impl Brain {
         let runs = runs.map(|(key, run)| (key, RunBook::from_disk(run)));
         let epochs = stored.epochs.into_iter();
         let epochs = epochs.map(|(key, number)| (key, EpochBook::from_disk(number)));
-        let others = config.seeds.iter().filter(|seed| Some(**seed) != config.listen);
         let mut brain = Box::new(Self {
             me: config.robot.clone(),
-            seeds_of_others: others.count(),
+            seeds_of_others: config.seeds_of_others(),
             config,
             seams,
             mesh,

@@ -7,6 +7,7 @@ use super::{super::*, Bench, host, mesh, robot, role};
 use crate::{
     order::Version,
     record::{FleetKey, RecordKind},
+    report::LinkReport,
     units::Bytes,
 };
 
