@@ -303,9 +303,8 @@ impl FleetTable {
         let mut outdated = Vec::new();
         for kind in kinds {
             let parts = self.below(kind, system);
-            let old = parts.filter(|(key, known, _)| {
-                system_of_part(key) == Some(system) && *known < version
-            });
+            let old = parts
+                .filter(|(key, known, _)| system_of_part(key) == Some(system) && *known < version);
             outdated.extend(old.map(|(key, _, _)| key.clone()));
         }
         outdated

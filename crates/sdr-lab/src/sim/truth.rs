@@ -160,7 +160,7 @@ impl Fleet {
             let FleetValue::Component(spec) = value else { return None };
             Some((version, spec))
         });
-        specs.max_by_key(|(version, _)| *version).map(|(_, spec)| spec)
+        specs.max_by_key(|(version, _)| *version).map(|(_, spec)| &**spec)
     }
 
     /// How many components were ever seen.
