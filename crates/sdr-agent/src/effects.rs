@@ -30,7 +30,7 @@ impl Effects {
     pub(crate) fn carry_out(&self, effect: Effect) {
         match effect {
             Effect::Send { to, bytes } => self.mesh.send(to, &bytes),
-            Effect::Store { ticket, state } => self.store.put(ticket, state),
+            Effect::Store { ticket, change } => self.store.put(ticket, change),
             Effect::Launch(order) => self.supervisor.launch(*order),
             Effect::Command { instance, command } => self.supervisor.command(instance, command),
             Effect::Routes(routes) => self.data.set_routes(routes),

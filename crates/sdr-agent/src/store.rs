@@ -1,4 +1,5 @@
-//! What the brain must not forget, on disk: replaced as a whole, checked when read.
+//! What the brain must not forget, on disk: replaced as a whole, checked when read. The brain
+//! orders what changed; the writer holds the whole, whose facts are the brain's own.
 //!
 //! ```text
 //!  "SDRSTATE" | version u32 | checksum u64 of the rest | StoredState in postcard
@@ -11,7 +12,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use sdr_core::{
-    effect::StoredState,
+    effect::{StoredChange, StoredState},
     input::{Input, StoreTicket},
     order::hash64,
 };
@@ -69,7 +70,7 @@ pub(crate) enum StateError {
     Content(postcard::Error),
 }
 
-/// Writes states on a thread of its own; the newest order replaces those still waiting.
+/// Writes states on a thread of its own; orders that wait are written together.
 #[derive(Debug)]
 pub(crate) struct Store {
     slot: Arc<Slot>,
@@ -84,7 +85,8 @@ struct Slot {
 
 #[derive(Debug, Default)]
 struct Waiting {
-    order: Option<(StoreTicket, StoredState)>,
+    /// The newest ticket, and the changes up to it.
+    order: Option<(StoreTicket, Vec<StoredChange>)>,
     closed: bool,
 }
 
@@ -96,15 +98,19 @@ impl Store {
         events: Events,
     ) -> io::Result<Self> {
         let slot = Arc::new(Slot::default());
-        let desk = Desk { slot: Arc::clone(&slot), dir, inputs, events, failing: false };
+        let state = StoredState::default();
+        let desk = Desk { slot: Arc::clone(&slot), dir, inputs, events, state, failing: false };
         let writer = thread::Builder::new().name("store".into()).spawn(move || desk.run())?;
         Ok(Self { slot, writer: Some(writer) })
     }
 
-    /// Orders `state` to be written; its outcome answers all orders before it as well.
-    pub(crate) fn put(&self, ticket: StoreTicket, state: StoredState) {
+    /// Orders `change` to be written; its outcome answers all orders before it as well.
+    pub(crate) fn put(&self, ticket: StoreTicket, change: StoredChange) {
         let mut waiting = self.slot.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        waiting.order = Some((ticket, state));
+        let before = waiting.order.take().map(|(_, changes)| changes);
+        let mut changes = before.filter(|_| !change.whole).unwrap_or_default();
+        changes.push(change);
+        waiting.order = Some((ticket, changes));
         self.slot.changed.notify_one();
     }
 }
@@ -127,13 +133,15 @@ struct Desk {
     dir: PathBuf,
     inputs: mpsc::Sender<Input>,
     events: Events,
+    state: StoredState,
     failing: bool,
 }
 
 impl Desk {
     fn run(mut self) {
-        while let Some((ticket, state)) = self.slot.take() {
-            let outcome = match write(&self.dir, &state) {
+        while let Some((ticket, changes)) = self.slot.take() {
+            changes.into_iter().for_each(|change| self.state.take(change));
+            let outcome = match write(&self.dir, &self.state) {
                 Ok(()) => {
                     self.turn(false, "the state reaches the disk again");
                     Input::Stored { ticket }
@@ -163,7 +171,7 @@ impl Desk {
 
 impl Slot {
     /// Waits for an order; `None` once closed and empty.
-    fn take(&self) -> Option<(StoreTicket, StoredState)> {
+    fn take(&self) -> Option<(StoreTicket, Vec<StoredChange>)> {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
             if let Some(order) = waiting.order.take() {
@@ -254,6 +262,13 @@ mod tests {
         StoredState { incarnation, ..StoredState::default() }
     }
 
+    /// What is new when the incarnation is: the first order holds everything.
+    fn change(incarnation: u64) -> StoredChange {
+        let address = std::net::SocketAddr::from(([10, 0, 0, 1], 7000));
+        let (whole, peers) = (incarnation == 1, (incarnation == 1).then(|| vec![address]));
+        StoredChange { whole, incarnation, peers, ..StoredChange::default() }
+    }
+
     #[test]
     fn what_was_stored_last_is_read_back_and_its_ticket_answered() {
         let dir = tempfile::tempdir().unwrap();
@@ -261,7 +276,7 @@ mod tests {
 
         let store = Store::start(dir.path().into(), inputs, events()).unwrap();
         for ticket in 1..=20 {
-            store.put(ticket, state(ticket));
+            store.put(ticket, change(ticket));
         }
         drop(store);
 
@@ -273,7 +288,8 @@ mod tests {
         }
         assert_eq!(last, 20);
         let Remembered::State(found) = read(dir.path()).unwrap() else { panic!("no state") };
-        assert_eq!(found, state(20));
+        // what an order does not name stays
+        assert_eq!((found.incarnation, found.peers.len()), (20, 1));
     }
 
     #[test]
@@ -311,7 +327,7 @@ mod tests {
         let events = events();
 
         let store = Store::start(gone, inputs, events.clone()).unwrap();
-        store.put(7, state(1));
+        store.put(7, change(1));
         drop(store);
 
         let outcome = outcomes.try_recv().unwrap();

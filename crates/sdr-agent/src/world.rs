@@ -120,7 +120,11 @@ struct Ground {
 
 /// What other crates fill in for the brain.
 fn seams() -> Seams {
-    Seams { recovery: Box::new(sdr_recovery::make), allocation: Box::new(sdr_alloc::check) }
+    Seams {
+        recovery: Box::new(sdr_recovery::make),
+        allocation: Box::new(sdr_alloc::check),
+        commons: None,
+    }
 }
 
 impl World {

@@ -1,6 +1,6 @@
 //! Everything the brain can ask for. What came of it returns as the next input.
 
-use alloc::{boxed::Box, string::String, vec::Vec};
+use alloc::{boxed::Box, collections::BTreeMap, string::String, sync::Arc, vec::Vec};
 use core::net::SocketAddr;
 
 use serde::{Deserialize, Serialize};
@@ -11,6 +11,7 @@ use crate::{
     event::Event,
     id::{ComponentKey, Name, RobotId},
     input::{InstanceId, PlanId, RequestId, StoreTicket},
+    mesh::{Fact, Facts},
     order::{Run, Token},
     record::FleetKey,
     spec::{ComponentSpec, Qos},
@@ -26,12 +27,13 @@ pub enum Effect {
         /// At most 1200 bytes.
         bytes: Vec<u8>,
     },
-    /// Put the state on disk, replacing what is there; answered by `Stored`.
+    /// Put on disk what changed, together with all changes before that did not get there;
+    /// answered by `Stored`.
     Store {
         /// Names the order.
         ticket: StoreTicket,
-        /// All of it.
-        state: StoredState,
+        /// What is new since the order before.
+        change: StoredChange,
     },
     /// Start a process; answered by instance news.
     Launch(Box<LaunchOrder>),
@@ -135,29 +137,58 @@ pub enum Direction {
     In,
 }
 
-/// What an agent must not forget.
+/// What an agent must not forget: all changes together.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredState {
     /// Incarnations so far.
     pub incarnation: u64,
-    /// The fleet table: key, encoded version, value.
-    pub fleet: Vec<StoredRecord>,
+    /// The fleet table.
+    pub fleet: Facts,
     /// Runs reserved per component: activations below this number may have been sent.
-    pub runs: Vec<(ComponentKey, Run)>,
+    pub runs: BTreeMap<ComponentKey, Run>,
     /// Peers heard so far.
     pub peers: Vec<SocketAddr>,
     /// Epochs reserved per component: numbers up to this one may have been sent.
     #[serde(default)]
-    pub epochs: Vec<(ComponentKey, u64)>,
+    pub epochs: BTreeMap<ComponentKey, u64>,
 }
 
-/// One record of the fleet table on disk.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StoredRecord {
-    /// What it is about.
-    pub key: FleetKey,
-    /// Its version.
-    pub version: crate::order::Version,
-    /// Its value, as on the wire.
-    pub value: Vec<u8>,
+impl StoredState {
+    /// Takes a change in; it costs what changed, not what is there.
+    pub fn take(&mut self, change: StoredChange) {
+        if change.whole {
+            *self = Self::default();
+        }
+        self.incarnation = change.incarnation;
+        for key in &change.dropped {
+            self.fleet.remove(key);
+        }
+        for fact in change.facts {
+            self.fleet.put(fact);
+        }
+        self.runs.extend(change.runs);
+        self.epochs.extend(change.epochs);
+        if let Some(peers) = change.peers {
+            self.peers = peers;
+        }
+    }
+}
+
+/// What is new of a [`StoredState`]; facts are shared with the brain that ordered it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StoredChange {
+    /// It is all there is: what was ordered before is void.
+    pub whole: bool,
+    /// Incarnations so far.
+    pub incarnation: u64,
+    /// Facts that are new, in place of those under their keys.
+    pub facts: Vec<Arc<Fact>>,
+    /// Facts that are gone.
+    pub dropped: Vec<FleetKey>,
+    /// Runs reserved since.
+    pub runs: Vec<(ComponentKey, Run)>,
+    /// Epochs reserved since.
+    pub epochs: Vec<(ComponentKey, u64)>,
+    /// All peers, when there are others than before.
+    pub peers: Option<Vec<SocketAddr>>,
 }

@@ -1,9 +1,18 @@
 //! Who and what: robots, names, components.
 
 use alloc::string::{String, ToString};
-use core::{fmt, str::FromStr};
+use core::{
+    cmp::Ordering,
+    fmt,
+    hash::{Hash, Hasher},
+    marker::PhantomData,
+    str::FromStr,
+};
 
-use serde::{Deserialize, Serialize};
+use serde::{
+    Deserialize, Deserializer, Serialize, Serializer,
+    de::{self, Visitor},
+};
 use thiserror::Error;
 
 /// Longest name of a robot, system, component or port, in bytes.
@@ -62,23 +71,95 @@ fn check(word: &str, dash: bool) -> Result<(), NameError> {
     Ok(())
 }
 
+/// A checked word in place: comparing and copying it touches nothing else.
+///
+/// Bytes behind its end are zero, which no name holds, so that order and equality of the
+/// whole are those of the word.
+#[derive(Clone)]
+struct Word {
+    bytes: [u8; NAME_BYTES_MAX],
+    len: u8,
+}
+
+impl Word {
+    /// `word`, which was checked and has at most [`NAME_BYTES_MAX`] bytes.
+    fn of(word: &str) -> Self {
+        let mut bytes = [0; NAME_BYTES_MAX];
+        bytes[..word.len()].copy_from_slice(word.as_bytes());
+        Self { bytes, len: u8::try_from(word.len()).expect("a name has at most 32 bytes") }
+    }
+
+    fn as_str(&self) -> &str {
+        core::str::from_utf8(&self.bytes[..usize::from(self.len)]).expect("names are ASCII")
+    }
+}
+
+/// Eight bytes at once: names are compared with every datagram.
+impl Ord for Word {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let (own, _) = self.bytes.as_chunks::<8>();
+        let (others, _) = other.bytes.as_chunks::<8>();
+        for (own, other) in own.iter().zip(others) {
+            let order = u64::from_be_bytes(*own).cmp(&u64::from_be_bytes(*other));
+            if order != Ordering::Equal {
+                return order;
+            }
+        }
+        Ordering::Equal
+    }
+}
+
+impl PartialOrd for Word {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Word {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Word {}
+
+impl Hash for Word {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.as_str().hash(state);
+    }
+}
+
+/// Reads a name from any text.
+struct WordVisitor<T>(PhantomData<T>);
+
+impl<T: FromStr<Err = NameError>> Visitor<'_> for WordVisitor<T> {
+    type Value = T;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a name")
+    }
+
+    fn visit_str<E: de::Error>(self, word: &str) -> Result<T, E> {
+        word.parse().map_err(E::custom)
+    }
+}
+
 macro_rules! name_type {
     ($(#[$doc:meta])* $name:ident, $dash:expr) => {
         $(#[$doc])*
-        #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-        #[serde(try_from = "String", into = "String")]
-        pub struct $name(String);
+        #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $name(Word);
 
         impl $name {
             /// The name `word`, when it is one.
             pub fn new(word: &str) -> Result<Self, NameError> {
                 check(word, $dash)?;
-                Ok(Self(word.to_string()))
+                Ok(Self(Word::of(word)))
             }
 
             /// The name as text.
             pub fn as_str(&self) -> &str {
-                &self.0
+                self.0.as_str()
             }
         }
 
@@ -86,14 +167,13 @@ macro_rules! name_type {
             type Error = NameError;
 
             fn try_from(word: String) -> Result<Self, NameError> {
-                check(&word, $dash)?;
-                Ok(Self(word))
+                Self::new(&word)
             }
         }
 
         impl From<$name> for String {
             fn from(name: $name) -> Self {
-                name.0
+                name.as_str().into()
             }
         }
 
@@ -107,7 +187,25 @@ macro_rules! name_type {
 
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.pad(&self.0)
+                f.pad(self.as_str())
+            }
+        }
+
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.debug_tuple(stringify!($name)).field(&self.as_str()).finish()
+            }
+        }
+
+        impl Serialize for $name {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_str(self.as_str())
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                deserializer.deserialize_str(WordVisitor(PhantomData))
             }
         }
     };
@@ -128,7 +226,7 @@ name_type!(
 impl RobotId {
     /// The name as it stands in ROS 2 topics: `-` becomes `_`.
     pub fn topic_word(&self) -> String {
-        self.0.replace('-', "_")
+        self.as_str().replace('-', "_")
     }
 }
 
@@ -164,6 +262,8 @@ impl fmt::Display for ComponentKey {
 
 #[cfg(test)]
 mod tests {
+    use alloc::{vec, vec::Vec};
+
     use super::*;
 
     #[test]
@@ -177,6 +277,16 @@ mod tests {
         assert!(Name::new(&"a".repeat(33)).is_err());
         assert_eq!(RobotId::new("robot-1").unwrap().topic_word(), "robot_1");
         assert!(RobotId::new("-1").is_err());
+    }
+
+    #[test]
+    fn names_are_ordered_as_their_words_are() {
+        let mut words =
+            vec!["a", "aa", "ab", "a_b", "robot1", "robot10", "robot2", "robot12345678901234"];
+        let mut names: Vec<Name> = words.iter().map(|word| Name::new(word).unwrap()).collect();
+        words.sort_unstable();
+        names.sort_unstable();
+        assert!(names.iter().map(Name::as_str).eq(words));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! fits a datagram. A [`SystemRecord`] of some revision is complete once as many component
 //! and connection records of that revision are there as it counts.
 
-use alloc::{string::String, vec::Vec};
+use alloc::{string::String, sync::Arc, vec::Vec};
 
 use serde::{Deserialize, Serialize};
 
@@ -96,6 +96,13 @@ impl Assignment {
     pub fn stands_by_at_home(&self) -> bool {
         self.standbys.contains(&self.home)
     }
+
+    /// Whether `robot` acts on it: as home, standby, target or old home.
+    pub fn concerns(&self, robot: &RobotId) -> bool {
+        self.home == *robot
+            || self.others().any(|other| other == robot)
+            || self.drains.as_ref() == Some(robot)
+    }
 }
 
 /// Who holds the coordinator role; its term and holder are the record's version.
@@ -111,19 +118,19 @@ pub struct RoleRecord {
     pub by_operator: bool,
 }
 
-/// A checked value of the fleet table.
+/// A checked value of the fleet table; parts of systems are shared by all who look at them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FleetValue {
     /// A system.
     System(SystemRecord),
     /// A component of a system.
-    Component(ComponentSpec),
+    Component(Arc<ComponentSpec>),
     /// A connection of a system.
-    Connection(ConnectionSpec),
+    Connection(Arc<ConnectionSpec>),
     /// An allocation policy.
-    Allocation(PolicyBytes),
+    Allocation(Arc<PolicyBytes>),
     /// A recovery policy.
-    Recovery(PolicyBytes),
+    Recovery(Arc<PolicyBytes>),
     /// A home.
     Assignment(Assignment),
     /// The role.
@@ -142,10 +149,10 @@ impl FleetValue {
         }
         match kind {
             RecordKind::SYSTEM => take(bytes).map(Self::System),
-            RecordKind::COMPONENT => take(bytes).map(Self::Component),
-            RecordKind::CONNECTION => take(bytes).map(Self::Connection),
-            RecordKind::ALLOCATION => take(bytes).map(Self::Allocation),
-            RecordKind::RECOVERY => take(bytes).map(Self::Recovery),
+            RecordKind::COMPONENT => take(bytes).map(|value| Self::Component(Arc::new(value))),
+            RecordKind::CONNECTION => take(bytes).map(|value| Self::Connection(Arc::new(value))),
+            RecordKind::ALLOCATION => take(bytes).map(|value| Self::Allocation(Arc::new(value))),
+            RecordKind::RECOVERY => take(bytes).map(|value| Self::Recovery(Arc::new(value))),
             RecordKind::ASSIGNMENT => take(bytes).map(Self::Assignment),
             RecordKind::ROLE => take(bytes).map(Self::Role),
             RecordKind::ROLE_POLICY => take(bytes).map(Self::RolePolicy),
@@ -157,9 +164,9 @@ impl FleetValue {
     pub fn encode(&self) -> Vec<u8> {
         let bytes = match self {
             Self::System(value) => postcard::to_allocvec(value),
-            Self::Component(value) => postcard::to_allocvec(value),
-            Self::Connection(value) => postcard::to_allocvec(value),
-            Self::Allocation(value) | Self::Recovery(value) => postcard::to_allocvec(value),
+            Self::Component(value) => postcard::to_allocvec(&**value),
+            Self::Connection(value) => postcard::to_allocvec(&**value),
+            Self::Allocation(value) | Self::Recovery(value) => postcard::to_allocvec(&**value),
             Self::Assignment(value) => postcard::to_allocvec(value),
             Self::Role(value) => postcard::to_allocvec(value),
             Self::RolePolicy(value) => postcard::to_allocvec(value),

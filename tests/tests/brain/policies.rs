@@ -19,7 +19,11 @@ fn unreadable() -> PolicyBytes {
 }
 
 fn seams() -> Seams {
-    Seams { recovery: Box::new(sdr_recovery::make), allocation: Box::new(sdr_alloc::check) }
+    Seams {
+        recovery: Box::new(sdr_recovery::make),
+        allocation: Box::new(sdr_alloc::check),
+        commons: None,
+    }
 }
 
 #[test]

@@ -60,7 +60,7 @@ impl Brain {
     /// Publishes what will have to leave if nothing changes, so that its next home gets ready.
     pub(super) fn foresee(&mut self, now: Instant, system: &Name) {
         let Some(engine) = self.engines.get(system) else { return };
-        for seen in engine.recovery.foreseen() {
+        for seen in engine.recovery().foreseen() {
             let place = (system.clone(), seen.cause);
             let condition =
                 self.conditions.entry(place.clone()).or_insert_with(|| ConditionReport {
@@ -88,7 +88,7 @@ impl Brain {
     /// Takes conditions back whose components left, or whose cause is over; says the others.
     pub(super) fn clear_conditions(&mut self, now: Instant) {
         let standing: Vec<CauseStatus> =
-            self.engines.values().flat_map(|engine| engine.recovery.standing()).collect();
+            self.engines.values().flat_map(|engine| engine.recovery().standing()).collect();
         let mut conditions = core::mem::take(&mut self.conditions);
         let foreseen = &self.foreseen_until;
         let mut over = Vec::new();
@@ -120,6 +120,9 @@ impl Brain {
             }
         }
         self.conditions = conditions;
+        if !self.conditions.is_empty() {
+            self.index.troubled.insert(self.me.clone());
+        }
         for condition in self.conditions.values() {
             self.mesh.report(&Report::Condition(condition.clone()), Push::Now);
         }
@@ -137,7 +140,7 @@ impl Brain {
                 continue;
             }
             if let Some(engine) = self.engines.get_mut(&key.system) {
-                engine.recovery.outcome(now, &key, RemedyOutcome::Refused);
+                engine.with(|recovery| recovery.outcome(now, &key, RemedyOutcome::Refused));
                 self.judge_due = true;
             }
         }

@@ -1,10 +1,11 @@
 //! What a brain is given at its start.
 
-use alloc::{boxed::Box, string::String, vec::Vec};
+use alloc::{boxed::Box, string::String, sync::Arc, vec::Vec};
 use core::{fmt, net::SocketAddr, time::Duration};
 
 use crate::{
-    fitness::RolePolicy, id::RobotId, recover::Recovery, report::RobotFacts, spec::PolicyBytes,
+    fitness::RolePolicy, id::RobotId, mesh::Commons, recover::Recovery, report::RobotFacts,
+    spec::PolicyBytes,
 };
 
 /// Who the robot is and how patient it is.
@@ -57,6 +58,13 @@ impl BrainConfig {
     }
 }
 
+impl BrainConfig {
+    /// How many addresses to begin with are not this robot's own.
+    pub(super) fn seeds_of_others(&self) -> usize {
+        self.seeds.iter().filter(|seed| Some(**seed) != self.listen).count()
+    }
+}
+
 /// Makes a recovery engine from a policy; the error is for people.
 pub type MakeRecovery =
     Box<dyn Fn(&PolicyBytes) -> Result<Box<dyn Recovery + Send>, String> + Send>;
@@ -70,6 +78,8 @@ pub struct Seams {
     pub recovery: MakeRecovery,
     /// Reads the allocation policy of a system.
     pub allocation: CheckAllocation,
+    /// What several brains in one process hold in common; `None` for one that is alone.
+    pub commons: Option<Arc<dyn Commons>>,
 }
 
 impl fmt::Debug for Seams {

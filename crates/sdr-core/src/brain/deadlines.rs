@@ -6,13 +6,18 @@ use crate::time::Instant;
 impl Brain {
     /// When `Input::Tick` is due at the latest.
     pub fn next_deadline(&self) -> Option<Instant> {
-        // a timer that is already past was acted on and waits for something else
-        let timers = self.timers().filter(|at| *at > self.handled_at);
-        timers.chain([self.mesh.next_deadline(), self.look_at]).min()
+        let timer = self.timer_at.into_iter();
+        timer.chain([self.mesh.next_deadline(), self.look_at]).min()
+    }
+
+    /// The next thing that is to be done at some time; a timer that is already past was acted
+    /// on and waits for something else.
+    pub(super) fn next_timer(&self) -> Option<Instant> {
+        self.timers().filter(|at| *at > self.handled_at).min()
     }
 
     /// All that is to be done at some time.
-    pub(super) fn timers(&self) -> impl Iterator<Item = Instant> {
+    fn timers(&self) -> impl Iterator<Item = Instant> {
         let restarts = self.restarts.values().map(|restart| restart.at);
         let drains = self.drains.values().map(|since| *since + self.config.drain_max);
         restarts

@@ -22,7 +22,8 @@ use crate::{
     id::{ComponentKey, Name, RobotId},
     input::PlanId,
     recover::{Cause, Remedy},
-    report::{ConditionReport, Report},
+    report::ConditionReport,
+    spec::ComponentSpec,
     time::Instant,
 };
 
@@ -49,20 +50,28 @@ impl Brain {
 
     /// Systems with a home that is gone, a call for help, or a component without a home or
     /// without a standby that it wishes for.
-    fn systems_to_look_at(&self, now: Instant) -> Vec<Arc<SystemNow>> {
-        let gone = self.index.homes().filter(|home| self.is_gone(home, now));
+    fn systems_to_look_at(&mut self, now: Instant) -> Vec<Arc<SystemNow>> {
+        let authors = self.mesh.authors();
+        let tells = |robot: &RobotId| {
+            authors.author(robot).is_some_and(|author| author.conditions().next().is_some())
+        };
+        self.index.troubled.retain(tells);
+        let gone = self.index.absent.iter().filter(|home| self.is_gone(home, now));
         let mut names: BTreeSet<&Name> =
             gone.flat_map(|home| self.index.at(home)).map(|key| &key.system).collect();
-        names.extend(self.index.homeless.iter().map(|key| &key.system));
+        names.extend(self.index.unplaced());
         names.extend(self.index.backed.iter().map(|key| &key.system));
-        let authors = self.mesh.alive().chain([&self.me]);
-        let authors = authors.filter_map(|robot| self.mesh.authors().author(robot));
-        for report in authors.flat_map(|author| author.reports()) {
-            if let Report::Condition(condition) = report {
-                names.insert(&condition.system);
-            }
-        }
+        names.extend(self.conditions_told().map(|(_, condition)| &condition.system));
         names.into_iter().filter_map(|name| self.systems.get(name).cloned()).collect()
+    }
+
+    /// What living robots say of their trouble, by robot.
+    fn conditions_told(&self) -> impl Iterator<Item = (&RobotId, &ConditionReport)> {
+        let robots = self.index.troubled.iter().filter(|robot| self.mesh.is_alive(robot));
+        robots.flat_map(|robot| {
+            let author = self.mesh.authors().author(robot).into_iter();
+            author.flat_map(move |author| author.conditions().map(move |told| (robot, told)))
+        })
     }
 
     fn ask_for_orphans(&mut self, now: Instant, system: &SystemNow) -> bool {
@@ -113,8 +122,7 @@ impl Brain {
     }
 
     fn ask_for_homeless(&mut self, now: Instant, system: &SystemNow) -> bool {
-        let homeless =
-            |spec: &&crate::spec::ComponentSpec| self.home(&system.key(&spec.name)).is_none();
+        let homeless = |spec: &&Arc<ComponentSpec>| self.home(&system.key(&spec.name)).is_none();
         let names: Vec<Name> =
             system.components.iter().filter(homeless).map(|spec| spec.name.clone()).collect();
         !names.is_empty() && self.ask(now, system, &names, Purpose::Deploy)
@@ -122,21 +130,13 @@ impl Brain {
 
     /// Conditions of living robots that call for another home.
     pub(super) fn calls_for_help(&self, system: &Name) -> Vec<(RobotId, ConditionReport)> {
-        let mut calls = Vec::new();
-        for robot in self.alive_robots() {
-            let Some(author) = self.mesh.authors().author(&robot) else { continue };
-            for report in author.reports() {
-                let Report::Condition(condition) = report else { continue };
-                let elsewhere = match condition.remedy {
-                    Remedy::StandbyElsewhere | Remedy::LaunchElsewhere => true,
-                    Remedy::LocalStandby | Remedy::Restart { .. } | Remedy::Hold => false,
-                };
-                if condition.system == *system && elsewhere {
-                    calls.push((robot.clone(), condition.clone()));
-                }
-            }
-        }
-        calls
+        let elsewhere = |condition: &ConditionReport| match condition.remedy {
+            Remedy::StandbyElsewhere | Remedy::LaunchElsewhere => true,
+            Remedy::LocalStandby | Remedy::Restart { .. } | Remedy::Hold => false,
+        };
+        let calls = self.conditions_told();
+        let calls = calls.filter(|(_, told)| told.system == *system && elsewhere(told));
+        calls.map(|(robot, told)| (robot.clone(), told.clone())).collect()
     }
 
     /// Asks the allocator, when the time for this question has come.
@@ -214,7 +214,7 @@ impl Brain {
         let Some(engine) = self.make_engine(&system.recovery) else { return Avoid::new() };
         let robots = self.alive_robots().into_iter();
         let ill = robots.filter_map(|robot| {
-            let (_, reason) = engine.recovery.objection(&self.figures_of(&robot)?)?;
+            let (_, reason) = engine.recovery().objection(&self.figures_of(&robot)?)?;
             Some((robot, reason))
         });
         ill.collect()

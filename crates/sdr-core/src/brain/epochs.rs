@@ -22,7 +22,7 @@ const LEFT_MIN: u64 = 4;
 pub(super) struct EpochBook {
     last: u64,
     pub(super) reserved: u64,
-    stored: u64,
+    pub(super) stored: u64,
 }
 
 impl EpochBook {

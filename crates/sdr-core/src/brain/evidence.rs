@@ -1,6 +1,6 @@
 //! What is seen of the components whose home is here, and of robots.
 
-use alloc::vec::Vec;
+use alloc::{collections::BTreeSet, vec::Vec};
 
 use super::Brain;
 use crate::{
@@ -58,13 +58,9 @@ impl Brain {
         if self.host.is_none() {
             return RobotEvidence::default();
         }
-        let partners = self.partners(component);
-        let used: Vec<LinkReport> = self
-            .mesh
-            .links()
-            .filter(|(robot, _)| self.mesh.is_alive(robot) && partners.contains(robot))
-            .map(|(_, link)| link)
-            .collect();
+        let partners: BTreeSet<RobotId> = self.partners(component).into_iter().collect();
+        let living = partners.iter().filter(|robot| self.mesh.is_alive(robot));
+        let used: Vec<LinkReport> = living.filter_map(|robot| self.mesh.link(robot)).collect();
         RobotEvidence {
             delay: median(used.iter().map(|link| link.rtt / 2).collect()),
             jitter: median(used.iter().map(|link| link.jitter).collect()),

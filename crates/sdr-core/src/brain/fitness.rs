@@ -8,7 +8,7 @@ use crate::{
     fitness::{Figures, Fitness, RolePolicy},
     id::RobotId,
     record::{FleetValue, RecordKind},
-    report::{LinkReport, Report, RolePreference},
+    report::{LinkReport, RolePreference},
     units::Permille,
 };
 
@@ -98,42 +98,21 @@ impl Brain {
     /// What a robot says of its links to robots that live.
     fn living_links(&self, robot: &RobotId) -> Vec<LinkReport> {
         let Some(author) = self.mesh.authors().author(robot) else { return Vec::new() };
-        let links = author.reports().filter_map(|report| match report {
-            Report::Link(other, link) if self.mesh.is_alive(other) => Some(*link),
-            Report::Link(..)
-            | Report::Facts(_)
-            | Report::Host(_)
-            | Report::Instance(_)
-            | Report::Condition(_)
-            | Report::Succession(_)
-            | Report::Homeless(_) => None,
-        });
-        links.collect()
+        let links = author.links().filter(|(other, _)| self.mesh.is_alive(other));
+        links.map(|(_, link)| *link).collect()
     }
 
     /// Trouble of the whole robot: a condition it told, foreseen ones too, or figures at which
     /// the recovery of a system would act. The role leaves before its holder is lost.
     fn trouble_of(&self, robot: &RobotId) -> Option<alloc::string::String> {
         let author = self.mesh.authors().author(robot);
-        let told =
-            author.into_iter().flat_map(|author| author.reports()).find_map(
-                |report| match report {
-                    Report::Condition(condition) if !is_event(condition.cause) => {
-                        Some(format!("{}: {}", condition.cause, condition.reason))
-                    }
-                    Report::Condition(_)
-                    | Report::Facts(_)
-                    | Report::Host(_)
-                    | Report::Link(..)
-                    | Report::Instance(_)
-                    | Report::Succession(_)
-                    | Report::Homeless(_) => None,
-                },
-            );
+        let mut told = author.into_iter().flat_map(|author| author.conditions());
+        let told = told.find(|condition| !is_event(condition.cause));
+        let told = told.map(|condition| format!("{}: {}", condition.cause, condition.reason));
         told.or_else(|| {
             let figures = self.figures_of(robot)?;
-            let mut engines = self.objectors.iter();
-            engines.find_map(|engine| Some(engine.recovery.objection(&figures)?.1))
+            let mut objectors = self.objectors.iter();
+            objectors.find_map(|objector| Some(objector.engine.recovery().objection(&figures)?.1))
         })
     }
 }

@@ -1,13 +1,13 @@
 //! The coordinator's judgement of robots that are not heard any more.
 
-use alloc::{collections::BTreeSet, format, string::String, vec::Vec};
+use alloc::{collections::BTreeSet, format, string::String, sync::Arc, vec::Vec};
 
 use super::Brain;
 use crate::{
     event::Event,
     id::{ComponentKey, Name, RobotId},
     planted::{self, Defect},
-    record::{FleetKey, FleetValue, RecordKind},
+    record::{FleetKey, RecordKind},
     recover::{Cause, Evidence, Fault, Remedy, RobotEvidence},
     time::{Duration, Instant},
     units::{Bytes, Permille},
@@ -30,9 +30,9 @@ impl Brain {
         if key.kind != RecordKind::ASSIGNMENT {
             return;
         }
-        let Some((record, value)) = self.mesh.fleet().entry(key) else { return };
-        if let FleetValue::Assignment(assignment) = value
-            && record.version.author != self.me
+        let Some(fact) = self.mesh.fleet().fact(key) else { return };
+        if let Some(assignment) = fact.assignment()
+            && fact.version().author != self.me
             && !self.mesh.is_alive(&assignment.home)
         {
             self.homes_told.retain(|_, until| now < *until);
@@ -126,10 +126,10 @@ impl Brain {
         if evidence.is_empty() {
             return Vec::new();
         }
-        let policy = running.recovery.clone();
+        let policy = Arc::clone(&running.recovery);
         // each look judges the absence anew: the plan, not the ladder, remembers attempts
         let Some(mut engine) = self.make_engine(&policy) else { return Vec::new() };
-        let verdicts = engine.recovery.judge(now, &evidence);
+        let verdicts = engine.with(|recovery| recovery.judge(now, &evidence));
         let leaves = verdicts.into_iter().filter(|verdict| match verdict.remedy {
             Remedy::StandbyElsewhere | Remedy::LaunchElsewhere => true,
             Remedy::LocalStandby | Remedy::Restart { .. } | Remedy::Hold => false,

@@ -75,9 +75,9 @@ impl Brain {
         let system = self.systems.get(&key.system);
         let made = system.and_then(|system| {
             let mut objectors = self.objectors.iter();
-            objectors.find(|engine| *engine.policy() == system.recovery)
+            objectors.find(|objector| *objector.engine.policy() == system.recovery)
         });
-        made.map_or_else(GuardPolicy::default, |engine| engine.recovery.guard())
+        made.map_or_else(GuardPolicy::default, |objector| objector.engine.recovery().guard())
     }
 
     /// Looks at the homes that this robot follows.
@@ -126,8 +126,7 @@ impl Brain {
 
     /// How long a home may be silent: its beats, with what its link loses, delays and jitters.
     fn guard_window(&self, home: &RobotId, policy: GuardPolicy) -> Duration {
-        let link = self.mesh.links().find(|(robot, _)| *robot == home).map(|(_, link)| link);
-        let link = link.unwrap_or_default();
+        let link = self.mesh.link(home).unwrap_or_default();
         policy.period * misses_at(policy.misses, link.loss) + link.rtt / 2 + link.jitter * 4
     }
 
@@ -135,7 +134,7 @@ impl Brain {
     fn is_due(&mut self, now: Instant, one: &Followed) -> bool {
         let age = self.mesh.age(&one.home, now).unwrap_or_else(|| now.since(self.started_at));
         let silent = age.min(now.since(self.guard.on_time_since));
-        let pair = self.mesh.authors().robots().count() <= 2;
+        let pair = self.mesh.authors().count() <= 2;
         let window = if pair { self.mesh.patience().0 } else { one.window };
         if silent < window {
             self.guard.suspects.remove(&one.home);

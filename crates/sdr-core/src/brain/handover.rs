@@ -97,7 +97,7 @@ impl Brain {
 
     /// A holder that hears nobody decides nothing for others: they may have another by now.
     fn rest_or_resume(&mut self) {
-        let others = self.mesh.authors().robots().count() > 2;
+        let others = self.mesh.authors().count() > 2;
         let isolated = others && self.mesh.is_isolated();
         if isolated != self.desk_of_role.suspended {
             self.desk_of_role.suspended = isolated;

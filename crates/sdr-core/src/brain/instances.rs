@@ -4,10 +4,11 @@ use alloc::{
     collections::BTreeMap,
     format,
     string::{String, ToString},
+    sync::Arc,
     vec::Vec,
 };
 
-use super::{Brain, index::Stir, judge::RestartPlan};
+use super::{Brain, index::Stir, judge::RestartPlan, systems::SystemNow};
 use crate::{
     effect::Command,
     event::Event,
@@ -43,6 +44,8 @@ pub(super) struct Instance {
     pub(super) component: ComponentKey,
     /// Hash of its spec and wiring: another one needs another process.
     pub(super) shape: u64,
+    /// The edition of its system that it was last found to fit.
+    pub(super) fits: Option<Arc<SystemNow>>,
     pub(super) state: LifecycleState,
     pub(super) token: Option<Token>,
     pub(super) told: Told,
@@ -57,6 +60,7 @@ impl Instance {
         Self {
             component,
             shape,
+            fits: None,
             state: LifecycleState::Created,
             token: None,
             told: Told::Nothing,

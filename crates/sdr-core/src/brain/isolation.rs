@@ -117,8 +117,7 @@ impl Brain {
 
     /// A fleet of one: nobody could take over.
     pub(super) fn is_only_robot(&self) -> bool {
-        let seeds = self.config.seeds.iter().any(|seed| Some(*seed) != self.config.listen);
-        !seeds && self.mesh.authors().robots().count() <= 1
+        self.seeds_of_others == 0 && self.mesh.authors().count() <= 1
     }
 
     /// Stops what must not act alone.

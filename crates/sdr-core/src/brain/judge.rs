@@ -1,6 +1,6 @@
 //! Trouble of this robot's own components: evidence, verdicts, local remedies, conditions.
 
-use alloc::{boxed::Box, collections::BTreeMap, format, string::String, vec::Vec};
+use alloc::{boxed::Box, collections::BTreeMap, format, string::String, sync::Arc, vec::Vec};
 use core::fmt;
 
 use super::{Brain, index::Stir};
@@ -14,8 +14,10 @@ use crate::{
 
 /// The recovery engine of one system on this robot.
 pub(super) struct Engine {
-    policy: PolicyBytes,
-    pub(super) recovery: Box<dyn Recovery + Send>,
+    policy: Arc<PolicyBytes>,
+    recovery: Box<dyn Recovery + Send>,
+    /// Kept, since it is looked at with every input.
+    deadline: Option<Instant>,
 }
 
 impl fmt::Debug for Engine {
@@ -25,17 +27,40 @@ impl fmt::Debug for Engine {
 }
 
 impl Engine {
-    pub(super) fn policy(&self) -> &PolicyBytes {
+    pub(super) fn policy(&self) -> &Arc<PolicyBytes> {
         &self.policy
     }
 
+    fn new(policy: Arc<PolicyBytes>, recovery: Box<dyn Recovery + Send>) -> Self {
+        let deadline = recovery.next_deadline();
+        Self { policy, recovery, deadline }
+    }
+
+    pub(super) fn recovery(&self) -> &dyn Recovery {
+        &*self.recovery
+    }
+
+    /// Does something that may move the deadline.
+    pub(super) fn with<T>(&mut self, act: impl FnOnce(&mut dyn Recovery) -> T) -> T {
+        let done = act(&mut *self.recovery);
+        self.deadline = self.recovery.next_deadline();
+        done
+    }
+
     pub(super) fn next_deadline(&self) -> Option<Instant> {
-        self.recovery.next_deadline()
+        self.deadline
     }
 
     pub(super) fn is_due(&self, now: Instant) -> bool {
         self.next_deadline().is_some_and(|at| now >= at)
     }
+}
+
+/// An engine that is asked what it objects to, for all systems of one policy.
+#[derive(Debug)]
+pub(super) struct Objector {
+    pub(super) engine: Engine,
+    systems: usize,
 }
 
 /// When a component may be started again.
@@ -47,8 +72,7 @@ pub(super) struct RestartPlan {
 impl Brain {
     pub(super) fn judge(&mut self, now: Instant) {
         self.judge_due = false;
-        let mut names: Vec<Name> = self.index.mine.iter().map(|key| key.system.clone()).collect();
-        names.dedup();
+        let names: Vec<Name> = self.index.my_systems().cloned().collect();
         self.engines.retain(|name, _| names.contains(name));
         for name in names {
             let evidence = self.evidence(&name);
@@ -57,7 +81,7 @@ impl Brain {
             }
             self.hold_what_has_no_rule(&name, &evidence);
             let engine = self.engines.get_mut(&name).expect("ensured above");
-            for verdict in engine.recovery.judge(now, &evidence) {
+            for verdict in engine.with(|recovery| recovery.judge(now, &evidence)) {
                 self.carry_out(now, &name, verdict);
             }
             self.foresee(now, &name);
@@ -70,7 +94,7 @@ impl Brain {
         for seen in evidence {
             let Some(fault) = &seen.fault else { continue };
             let engine = &self.engines[name];
-            if !engine.recovery.has_rule(fault.cause) {
+            if !engine.recovery().has_rule(fault.cause) {
                 let text = format!(
                     "no rule for {} in recovery `{}`: {}",
                     fault.cause, engine.policy.name, fault.reason
@@ -84,37 +108,46 @@ impl Brain {
     /// Makes the engine of a system when there is none for its present policy.
     fn ensure_engine(&mut self, name: &Name) -> bool {
         let Some(system) = self.systems.get(name) else { return false };
-        let policy = system.recovery.clone();
+        let policy = Arc::clone(&system.recovery);
         if self.engines.get(name).is_some_and(|engine| engine.policy == policy) {
             return true;
         }
         let Some((recovery, unread)) = self.readable_recovery(&policy) else { return false };
         if let Some(error) = unread {
-            let told = self.unreadable.insert(name.clone(), policy.clone());
+            let told = self.unreadable.insert(name.clone(), Arc::clone(&policy));
             if told.as_ref() != Some(&policy) {
                 self.event("policy-unreadable", format!("{error}; the default goes for {name}"));
             }
         }
-        self.engines.insert(name.clone(), Engine { policy, recovery });
+        self.engines.insert(name.clone(), Engine::new(policy, recovery));
         true
     }
 
-    /// Keeps one engine for each policy in use.
-    pub(super) fn update_objectors(&mut self) {
-        let in_use = |policy: &PolicyBytes| self.systems.values().any(|s| s.recovery == *policy);
-        let mut objectors = core::mem::take(&mut self.objectors);
-        objectors.retain(|engine| in_use(&engine.policy));
-        for system in self.systems.values() {
-            if !objectors.iter().any(|engine| engine.policy == system.recovery) {
-                objectors.extend(self.make_engine(&system.recovery));
+    /// One more system goes by this policy: robots are asked about it.
+    pub(super) fn need_objector(&mut self, policy: &Arc<PolicyBytes>) {
+        let mut known = self.objectors.iter_mut();
+        match known.find(|objector| objector.engine.policy == *policy) {
+            Some(objector) => objector.systems += 1,
+            None => {
+                let made = self.make_engine(policy);
+                self.objectors.extend(made.map(|engine| Objector { engine, systems: 1 }));
             }
         }
-        self.objectors = objectors;
     }
 
-    pub(super) fn make_engine(&self, policy: &PolicyBytes) -> Option<Engine> {
+    /// One system less goes by it.
+    pub(super) fn spare_objector(&mut self, policy: &Arc<PolicyBytes>) {
+        let known = self.objectors.iter().position(|known| known.engine.policy == *policy);
+        let Some(place) = known else { return };
+        self.objectors[place].systems -= 1;
+        if self.objectors[place].systems == 0 {
+            self.objectors.remove(place);
+        }
+    }
+
+    pub(super) fn make_engine(&self, policy: &Arc<PolicyBytes>) -> Option<Engine> {
         let (recovery, _) = self.readable_recovery(policy)?;
-        Some(Engine { policy: policy.clone(), recovery })
+        Some(Engine::new(Arc::clone(policy), recovery))
     }
 
     fn carry_out(&mut self, now: Instant, system: &Name, verdict: Verdict) {
@@ -138,7 +171,7 @@ impl Brain {
             }
         };
         if let (Some(outcome), Some(engine)) = (outcome, self.engines.get_mut(system)) {
-            engine.recovery.outcome(now, &key, outcome);
+            engine.with(|recovery| recovery.outcome(now, &key, outcome));
             self.judge_due |= outcome == RemedyOutcome::Refused;
         }
     }
@@ -164,13 +197,13 @@ impl Brain {
         self.faults.remove(key);
         self.said.forget_restarts(key);
         if let Some(engine) = self.engines.get_mut(&key.system) {
-            engine.recovery.forget(key);
+            engine.with(|recovery| recovery.forget(key));
         }
     }
 
     /// Causes that hold here, for status and screens.
     pub(super) fn standing(&self) -> Vec<CauseStatus> {
-        self.engines.values().flat_map(|engine| engine.recovery.standing()).collect()
+        self.engines.values().flat_map(|engine| engine.recovery().standing()).collect()
     }
 }
 

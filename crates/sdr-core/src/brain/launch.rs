@@ -1,6 +1,6 @@
 //! Starting processes: when, with which wiring, under which run.
 
-use alloc::{boxed::Box, vec::Vec};
+use alloc::{boxed::Box, sync::Arc, vec::Vec};
 
 use super::{
     Brain,
@@ -9,6 +9,7 @@ use super::{
 use crate::{
     effect::{Effect, InputWiring, LaunchOrder},
     id::ComponentKey,
+    input::InstanceId,
     order::{Run, hash64},
     planted::{self, Defect},
     spec::{ComponentSpec, Qos, port_path},
@@ -47,9 +48,20 @@ impl Brain {
         self.effects.push_back(Effect::Launch(Box::new(order)));
     }
 
-    /// The shape a process of this component should have now.
-    pub(super) fn shape(&self, key: &ComponentKey) -> Option<u64> {
-        self.shape_parts(key).map(|(spec, inputs, _)| shape_hash(&spec, &inputs))
+    /// Whether a process was started from another spec or wiring than its component has now.
+    pub(super) fn is_old_edition(&mut self, id: InstanceId, key: &ComponentKey) -> bool {
+        let Some(system) = self.systems.get(&key.system) else { return false };
+        let seen = self.instances[&id].fits.as_ref();
+        if seen.is_some_and(|seen| Arc::ptr_eq(seen, system)) {
+            return false;
+        }
+        let system = Arc::clone(system);
+        let parts = self.shape_parts(key);
+        let shape = parts.map(|(spec, inputs, _)| shape_hash(&spec, &inputs));
+        let Some(instance) = self.instances.get_mut(&id) else { return false };
+        let old = shape.is_some_and(|shape| shape != instance.shape);
+        instance.fits = (!old).then_some(system);
+        old
     }
 
     fn shape_parts(&self, key: &ComponentKey) -> Option<(ComponentSpec, Vec<InputWiring>, u8)> {

@@ -4,19 +4,21 @@ use alloc::{
     collections::{BTreeMap, BTreeSet},
     format,
     string::String,
+    sync::Arc,
     vec::Vec,
 };
+use core::net::SocketAddr;
 
 use super::Brain;
 use crate::{
     api::Accepted,
-    effect::{Effect, StoredRecord, StoredState},
+    effect::{Effect, StoredChange},
     id::{ComponentKey, Name},
     input::{RequestId, StoreTicket},
-    mesh::FleetRecord,
+    mesh::{Fact, FleetRecord, FleetTable, Merge, TableChange},
     order::Run,
     planted::{self, Defect},
-    record::{FleetKey, RecordKind},
+    record::{FleetKey, FleetValue, RecordKind},
     time::{Duration, Instant},
 };
 
@@ -50,6 +52,10 @@ pub(super) struct Desk {
     /// What others made is stored at this time at the latest.
     dirty_since: Option<Instant>,
     urgent: bool,
+    /// The shell holds all that was ordered: the next order says what changed since.
+    told: bool,
+    /// Peers as they were ordered last.
+    peers: Vec<SocketAddr>,
 }
 
 impl Desk {
@@ -142,30 +148,52 @@ impl Brain {
         self.desk.dirty = false;
         self.desk.urgent = false;
         self.desk.dirty_since = None;
-        let runs: Vec<(ComponentKey, Run)> =
-            self.runs.iter().map(|(key, book)| (key.clone(), book.reserved)).collect();
-        self.desk.runs_in_flight = runs.iter().cloned().collect();
-        let epochs: Vec<(ComponentKey, u64)> =
-            self.epochs.iter().map(|(key, book)| (key.clone(), book.reserved)).collect();
-        self.desk.epochs_in_flight = epochs.iter().cloned().collect();
-        let mut fleet = self.mesh.fleet().clone();
-        for record in self.desk.mints.iter().flat_map(|mint| &mint.records) {
-            fleet.merge(record.clone());
-        }
-        let mut fleet: Vec<StoredRecord> = fleet.to_stored();
-        fleet.retain(|record| match record.key.kind {
-            RecordKind::ROLE => !planted::is(Defect::TermNotStored),
-            RecordKind::ASSIGNMENT if planted::is(Defect::HomesNotStored) => false,
-            _ => !planted::is(Defect::SystemNotStored),
+        let change = self.change_to_store();
+        self.desk.runs_in_flight.extend(change.runs.iter().cloned());
+        self.desk.epochs_in_flight.extend(change.epochs.iter().cloned());
+        self.effects.push_back(Effect::Store { ticket: self.desk.last, change });
+    }
+
+    /// What changed since the last order, and what waits for the disk to be said.
+    fn change_to_store(&mut self) -> StoredChange {
+        let known = self.mesh.take_change().filter(|_| self.desk.told);
+        self.desk.told = true;
+        let whole = known.is_none();
+        let TableChange { mut facts, mut dropped } = known.unwrap_or_else(|| TableChange {
+            facts: self.mesh.fleet().facts().iter().cloned().collect(),
+            dropped: Vec::new(),
         });
-        let state = StoredState {
-            incarnation: self.mesh.incarnation().counter,
-            fleet,
-            runs,
-            epochs,
-            peers: self.mesh.peer_addresses(),
-        };
-        self.effects.push_back(Effect::Store { ticket: self.desk.last, state });
+        self.add_mints(&mut facts, &mut dropped);
+        facts.retain(|fact| is_stored(fact.key().kind));
+        let runs = self.runs.iter().filter(|(_, book)| whole || book.stored < book.reserved);
+        let runs = runs.map(|(key, book)| (key.clone(), book.reserved)).collect();
+        let epochs = self.epochs.iter().filter(|(_, book)| whole || book.stored < book.reserved);
+        let epochs = epochs.map(|(key, book)| (key.clone(), book.reserved)).collect();
+        let peers = self.mesh.peer_addresses();
+        let peers = (whole || peers != self.desk.peers).then_some(peers);
+        if let Some(peers) = &peers {
+            self.desk.peers.clone_from(peers);
+        }
+        let incarnation = self.mesh.incarnation().counter;
+        StoredChange { whole, incarnation, facts, dropped, runs, epochs, peers }
+    }
+
+    /// What is made here belongs on the disk before it is in the table.
+    fn add_mints(&self, facts: &mut Vec<Arc<Fact>>, dropped: &mut Vec<FleetKey>) {
+        let fleet = self.mesh.fleet();
+        let mut minted = FleetTable::default();
+        for record in self.desk.mints.iter().flat_map(|mint| &mint.records) {
+            minted.merge(record.clone());
+        }
+        for fact in minted.facts().iter().filter(|fact| fleet.judge(fact) == Merge::News) {
+            if let FleetValue::System(_) = fact.value() {
+                let old = fleet.parts_before(&fact.key().name, fact.version());
+                facts.retain(|fact| !old.contains(fact.key()));
+                dropped.extend(old);
+            }
+        }
+        let news = minted.facts().iter().filter(|fact| fleet.judge(fact) == Merge::News);
+        facts.extend(news.cloned());
     }
 
     pub(super) fn handle_stored(&mut self, ticket: StoreTicket) {
@@ -200,6 +228,8 @@ impl Brain {
     /// Keeps running, mints nothing, says so.
     pub(super) fn handle_store_failed(&mut self, ticket: StoreTicket, reason: &str) {
         self.desk.spoken = true;
+        // what could not be stored was not made: the disk must not bring it back
+        self.desk.told = false;
         self.desk.broken_at = Some(self.handled_at);
         if self.desk.in_flight == Some(ticket) {
             self.desk.in_flight = None;
@@ -216,5 +246,14 @@ impl Brain {
         self.event("minting-paused", String::from(reason));
         self.plans.pause(self.handled_at);
         self.desk.dirty = true;
+    }
+}
+
+/// All kinds are, but for planted defects.
+fn is_stored(kind: RecordKind) -> bool {
+    match kind {
+        RecordKind::ROLE => !planted::is(Defect::TermNotStored),
+        RecordKind::ASSIGNMENT if planted::is(Defect::HomesNotStored) => false,
+        _ => !planted::is(Defect::SystemNotStored),
     }
 }

@@ -75,7 +75,7 @@ use guard::GuardDesk;
 use index::{Index, Stir};
 use instances::{Instance, RunBook};
 use isolation::Lease;
-use judge::{Engine, RestartPlan};
+use judge::{Engine, Objector, RestartPlan};
 use minting::Desk;
 use moves::MoveWatch;
 use plans::PlanDesk;
@@ -99,6 +99,8 @@ const SETTLE_ROUNDS_MAX: usize = 4;
 pub struct Brain {
     config: BrainConfig,
     me: RobotId,
+    /// Addresses to begin with, but this robot's own.
+    seeds_of_others: usize,
     seams: Seams,
     mesh: Mesh,
     effects: VecDeque<Effect>,
@@ -124,9 +126,9 @@ pub struct Brain {
     said: Said,
     engines: BTreeMap<Name, Engine>,
     /// One engine for each recovery policy of the fleet, to ask what it objects to.
-    objectors: alloc::vec::Vec<Engine>,
+    objectors: alloc::vec::Vec<Objector>,
     /// Recovery policies that could not be read; each is told once.
-    unreadable: BTreeMap<Name, crate::spec::PolicyBytes>,
+    unreadable: BTreeMap<Name, Arc<crate::spec::PolicyBytes>>,
     faults: BTreeMap<ComponentKey, Fault>,
     conditions: BTreeMap<(Name, Cause), ConditionReport>,
     /// How long what is foreseen stays said.
@@ -179,7 +181,7 @@ impl Brain {
             period: config.gossip_period,
             gone_after: config.gone_after,
         };
-        let fleet = FleetTable::from_stored(stored.fleet);
+        let fleet = FleetTable::new(&stored.fleet, seams.commons.clone());
         let mesh = Mesh::new(mesh_config, own, fleet, &stored.peers, now);
         let runs = stored.runs.into_iter().filter(|_| !planted::is(Defect::RunNotReserved));
         let runs = runs.map(|(key, run)| (key, RunBook::from_disk(run)));
@@ -187,6 +189,7 @@ impl Brain {
         let epochs = epochs.map(|(key, number)| (key, EpochBook::from_disk(number)));
         let mut brain = Box::new(Self {
             me: config.robot.clone(),
+            seeds_of_others: config.seeds_of_others(),
             config,
             seams,
             mesh,
@@ -235,6 +238,7 @@ impl Brain {
         brain.refresh_all_systems();
         brain.say_facts();
         brain.store_now();
+        brain.timer_at = brain.next_timer();
         brain
     }
 
@@ -309,6 +313,11 @@ impl Brain {
         self.is_coordinator()
     }
 
+    /// The robot whose brain it is.
+    pub fn robot(&self) -> &RobotId {
+        &self.me
+    }
+
     /// What this robot knows of the fleet, to look at.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
@@ -360,7 +369,7 @@ impl Brain {
                 self.effects.push_back(Effect::Send { to, bytes });
             }
         }
-        self.timer_at = self.timers().filter(|at| *at > now).min();
+        self.timer_at = self.next_timer();
     }
 
     /// A timer passed, the start is over, or nothing was looked at for long.
@@ -377,7 +386,7 @@ impl Brain {
     /// Whether this robot may start what it remembers: it is in step with a peer, or waited
     /// for one long enough.
     fn may_begin(&self, now: Instant) -> bool {
-        let alone = self.config.seeds.iter().all(|seed| Some(*seed) == self.config.listen);
+        let alone = self.seeds_of_others == 0;
         !self.is_newborn() && (self.mesh.is_in_step() || alone || now >= self.begin_deadline())
     }
 

@@ -4,8 +4,9 @@ use alloc::{format, vec::Vec};
 
 use super::{Brain, index::Stir, systems::Changed};
 use crate::{
+    id::RobotId,
     input::InstanceId,
-    mesh::MeshNews,
+    mesh::{MeshNews, Spoken},
     planted::{self, Defect},
     time::Instant,
 };
@@ -18,14 +19,15 @@ impl Brain {
         let mut changed = Changed::default();
         while let Some(news) = self.mesh.poll_news() {
             match news {
-                MeshNews::Report(_) => self.stir = Stir::ALL,
+                MeshNews::Report(robot, spoken) => self.note_report(robot, &spoken),
                 MeshNews::Record(key) => {
                     self.desk.mark_dirty();
-                    self.stir = Stir::ALL;
+                    self.stir.fleet = true;
                     self.note_home(now, &key);
                     changed.note(&key);
                 }
                 MeshNews::Alive(robot) => {
+                    self.note_presence(&robot);
                     let text = format!("{robot} is heard");
                     self.event("robot-alive", text);
                     if planted::is(Defect::RestartedByHeal) {
@@ -45,7 +47,11 @@ impl Brain {
                     self.stir = Stir::ALL;
                     self.event("rejoined", "hears others again");
                 }
-                MeshNews::Gone(robot) => self.note_gone(now, &robot),
+                MeshNews::Gone(robot) => {
+                    self.note_presence(&robot);
+                    self.stir.fleet = true;
+                    self.note_gone(now, &robot);
+                }
                 MeshNews::DuplicateId(from) => {
                     if self.duplicates_told.len() < DUPLICATES_TOLD_MAX
                         && self.duplicates_told.insert(from)
@@ -57,5 +63,18 @@ impl Brain {
             }
         }
         self.refresh(&changed);
+    }
+
+    /// Looks at what a report concerns, and at nothing when it is figures alone: those are
+    /// looked at when their time comes.
+    fn note_report(&mut self, robot: RobotId, spoken: &Spoken) {
+        let index = &self.index;
+        let moves = !self.moves.is_empty() || !index.moving.is_empty() || !index.backed.is_empty();
+        self.stir.fleet |=
+            spoken.facts || spoken.conditions || (moves && !spoken.components.is_empty());
+        self.stir.here |= spoken.components.iter().any(|key| self.index.touches(&key.system));
+        if spoken.conditions {
+            self.index.troubled.insert(robot);
+        }
     }
 }

@@ -24,7 +24,7 @@ impl Brain {
     /// component placed by other weights is better than one without a home.
     pub(super) fn readable_allocation(&self, system: &SystemNow) -> PolicyBytes {
         match (self.seams.allocation)(&system.allocation) {
-            Ok(()) => system.allocation.clone(),
+            Ok(()) => (*system.allocation).clone(),
             Err(_) => PolicyBytes::default(),
         }
     }

@@ -6,7 +6,7 @@ use super::{Brain, systems::SystemNow};
 use crate::{
     allocate::{Item, Pair, Problem, RobotOffer, Settled, Tier, Wire},
     id::{ComponentKey, Name, RobotId},
-    report::{InstanceReport, Report},
+    report::{InstanceReport, LinkReport, Usage},
     spec::{ComponentSpec, Needs, launch_hash},
     units::Bytes,
 };
@@ -40,17 +40,17 @@ impl Brain {
             Place::Kept => Vec::new(),
         };
         let robots = self.alive_robots();
+        let mut running = self.running_on(&robots, &system.name);
         let chosen = system.components.iter().filter(|component| names.contains(&component.name));
         let items = chosen
             .map(|spec| {
                 let component = system.key(&spec.name);
-                let running = |robot: &&RobotId| self.instance_report(robot, &component).is_some();
                 Item {
                     needs: self.needs(system, spec),
                     launch: launch_hash(spec.launch.name()),
                     devices: spec.devices.clone(),
                     place: spec.place.clone(),
-                    running_on: robots.iter().filter(running).cloned().collect(),
+                    running_on: running.remove(&component).unwrap_or_default(),
                     avoid: avoid.get(&spec.name).cloned().unwrap_or_default(),
                     component,
                 }
@@ -116,19 +116,39 @@ impl Brain {
         })
     }
 
+    /// Who runs which components of a system, in the order of `robots`.
+    fn running_on(
+        &self,
+        robots: &[RobotId],
+        system: &Name,
+    ) -> BTreeMap<ComponentKey, Vec<RobotId>> {
+        let mut running: BTreeMap<ComponentKey, Vec<RobotId>> = BTreeMap::new();
+        for robot in robots {
+            for (component, _) in self.usages(robot) {
+                let stays = *robot != self.me || self.current(component).is_some();
+                if component.system == *system && stays {
+                    let there = running.entry(component.clone()).or_default();
+                    if there.last() != Some(robot) {
+                        there.push(robot.clone());
+                    }
+                }
+            }
+        }
+        running
+    }
+
     /// Needs of all that runs or will run on a robot, except `items` that will leave or come.
     fn taken(&self, robot: &RobotId, items: &[ComponentKey]) -> Vec<Needs> {
-        let mut taken: BTreeMap<ComponentKey, Needs> = BTreeMap::new();
-        for report in self.instance_reports(robot) {
-            let usage = Needs { memory: report.usage.memory, cpu: report.usage.cpu };
-            taken.insert(report.component, usage);
+        let mut taken: BTreeMap<&ComponentKey, Needs> = BTreeMap::new();
+        for (component, usage) in self.usages(robot) {
+            taken.insert(component, Needs { memory: usage.memory, cpu: usage.cpu });
         }
         for key in self.index.at(robot).chain(self.index.beside(robot)) {
             let system = self.systems.get(&key.system);
             let Some(spec) = system.and_then(|system| system.component(&key.name)) else {
                 continue;
             };
-            let needs = taken.entry(key.clone()).or_default();
+            let needs = taken.entry(key).or_default();
             needs.memory = needs.memory.max(spec.needs.memory);
             needs.cpu = needs.cpu.max(spec.needs.cpu);
             let twice = self.wanted(key).is_some_and(|(_, assignment)| {
@@ -138,30 +158,30 @@ impl Brain {
                 needs.memory = Bytes(needs.memory.0.saturating_mul(2));
             }
         }
-        taken.into_iter().filter(|(key, _)| !items.contains(key)).map(|(_, needs)| needs).collect()
+        taken.into_iter().filter(|(key, _)| !items.contains(*key)).map(|(_, needs)| needs).collect()
     }
 
     fn pairs(&self, robots: &[RobotId]) -> Vec<Pair> {
-        let mut pairs: BTreeMap<(RobotId, RobotId), Pair> = BTreeMap::new();
+        let mut ends: Vec<(&RobotId, &RobotId, &LinkReport)> = Vec::new();
         for robot in robots {
-            let Some(author) = self.mesh.authors().author(robot) else { continue };
-            for report in author.reports() {
-                let Report::Link(other, link) = report else { continue };
-                let (a, b) = if robot < other { (robot, other) } else { (other, robot) };
-                let pair = pairs.entry((a.clone(), b.clone())).or_insert_with(|| Pair {
-                    a: a.clone(),
-                    b: b.clone(),
-                    jitter: None,
-                    delay: None,
-                    loss: None,
-                });
-                // the worse of both ends
-                pair.jitter = pair.jitter.max(Some(link.jitter));
-                pair.delay = pair.delay.max(Some(link.rtt / 2));
-                pair.loss = pair.loss.max(Some(link.loss));
-            }
+            let author = self.mesh.authors().author(robot).into_iter();
+            ends.extend(author.flat_map(|author| author.links()).map(|(other, link)| {
+                if robot < other { (robot, other, link) } else { (other, robot, link) }
+            }));
         }
-        pairs.into_values().collect()
+        ends.sort_by_key(|(a, b, _)| (*a, *b));
+        let same = |one: &(&RobotId, &RobotId, _), other: &(&RobotId, &RobotId, _)| {
+            (one.0, one.1) == (other.0, other.1)
+        };
+        let pair = |ends: &[(&RobotId, &RobotId, &LinkReport)]| Pair {
+            a: ends[0].0.clone(),
+            b: ends[0].1.clone(),
+            // the worse of both ends
+            jitter: ends.iter().map(|(_, _, link)| link.jitter).max(),
+            delay: ends.iter().map(|(_, _, link)| link.rtt / 2).max(),
+            loss: ends.iter().map(|(_, _, link)| link.loss).max(),
+        };
+        ends.chunk_by(same).map(pair).collect()
     }
 
     /// What `robot` runs of a component; of this robot, as it is now.
@@ -176,20 +196,13 @@ impl Brain {
         }
     }
 
-    fn instance_reports(&self, robot: &RobotId) -> Vec<InstanceReport> {
-        if *robot == self.me {
-            return self.instances.keys().map(|id| self.own_report(*id)).collect();
-        }
-        let Some(author) = self.mesh.authors().author(robot) else { return Vec::new() };
-        let instances = author.reports().filter_map(|report| match report {
-            Report::Instance(instance) => Some(instance.clone()),
-            Report::Facts(_)
-            | Report::Host(_)
-            | Report::Link(..)
-            | Report::Condition(_)
-            | Report::Succession(_)
-            | Report::Homeless(_) => None,
-        });
-        instances.collect()
+    /// What each instance on a robot takes; of this robot, as it is now.
+    fn usages(&self, robot: &RobotId) -> impl Iterator<Item = (&ComponentKey, Usage)> {
+        let here = *robot == self.me;
+        let own = self.instances.values().filter(move |_| here);
+        let author = self.mesh.authors().author(robot).filter(|_| !here).into_iter();
+        let theirs = author.flat_map(|author| author.instances());
+        let own = own.map(|instance| (&instance.component, instance.usage));
+        own.chain(theirs.map(|report| (&report.component, report.usage)))
     }
 }

@@ -72,10 +72,7 @@ impl Brain {
             self.launch_when_due(now, key);
             return;
         };
-        let shape = self.shape(key);
-        let instance = &self.instances[&id];
-        let old = shape.is_some_and(|shape| shape != instance.shape);
-        if old && !planted::is(Defect::OldEditionRuns) {
+        if self.is_old_edition(id, key) && !planted::is(Defect::OldEditionRuns) {
             self.event_about("respecified", key, "its spec or wiring changed");
             self.finish(id);
             return;
@@ -84,6 +81,7 @@ impl Brain {
             self.be_silent(now, id, key);
             return;
         }
+        let instance = &self.instances[&id];
         let fits = match &instance.told {
             // an older life's run: this robot had forgotten how often it had lived
             Told::Activate(token) => token.epoch == *epoch && token.run > self.first_run(),
@@ -123,10 +121,9 @@ impl Brain {
         };
         self.keep_spare(now, key);
         self.reserve_epochs(key);
-        let instance = &self.instances[&id];
-        if self.shape(key).is_some_and(|shape| shape != instance.shape) {
+        if self.is_old_edition(id, key) {
             self.finish(id);
-        } else if matches!(instance.told, Told::Activate(_)) {
+        } else if self.instances[&id].is_told_to_act() {
             self.instances.get_mut(&id).expect("listed above").told = Told::Deactivate;
             self.command(id, Command::Deactivate);
             self.event_about("fenced", key, "another robot is its home now");

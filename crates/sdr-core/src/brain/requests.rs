@@ -3,6 +3,7 @@
 use alloc::{
     format,
     string::{String, ToString},
+    sync::Arc,
     vec::Vec,
 };
 
@@ -135,25 +136,29 @@ impl Brain {
             (
                 RecordKind::ALLOCATION,
                 system.name.to_string(),
-                FleetValue::Allocation(system.allocation.clone()),
+                FleetValue::Allocation(Arc::new(system.allocation.clone())),
             ),
             (
                 RecordKind::RECOVERY,
                 system.name.to_string(),
-                FleetValue::Recovery(system.recovery.clone()),
+                FleetValue::Recovery(Arc::new(system.recovery.clone())),
             ),
         ];
         for (index, component) in system.components.iter().enumerate() {
             let mut component = component.clone();
             component.index = count(index);
             let name = format!("{}/{}", system.name, component.name);
-            parts.push((RecordKind::COMPONENT, name, FleetValue::Component(component)));
+            parts.push((RecordKind::COMPONENT, name, FleetValue::Component(Arc::new(component))));
         }
         for (index, connection) in system.connections.iter().enumerate() {
             let mut connection = connection.clone();
             connection.index = count(index);
             let name = format!("{}/{index}", system.name);
-            parts.push((RecordKind::CONNECTION, name, FleetValue::Connection(connection)));
+            parts.push((
+                RecordKind::CONNECTION,
+                name,
+                FleetValue::Connection(Arc::new(connection)),
+            ));
         }
         let version = self.deployment_version(revision);
         parts

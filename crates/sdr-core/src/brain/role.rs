@@ -12,7 +12,7 @@ use crate::{
     order::Version,
     planted::{self, Defect},
     record::{FleetValue, RecordKind, RoleRecord},
-    report::{Report, SuccessionReport},
+    report::SuccessionReport,
     time::{Duration, Instant},
 };
 
@@ -42,10 +42,7 @@ pub(super) struct RoleDesk {
 
 impl Brain {
     pub(super) fn role(&self) -> Option<&RoleRecord> {
-        match self.mesh.fleet().get(RecordKind::ROLE, "")? {
-            (_, FleetValue::Role(role)) => Some(role),
-            (_, _) => None,
-        }
+        self.mesh.fleet().role()
     }
 
     pub(super) fn term(&self) -> u64 {
@@ -119,9 +116,8 @@ impl Brain {
     /// fleet is too small for that.
     pub(super) fn has_witness(&self) -> bool {
         // after the loss of a disk nobody is known yet, but those it is to begin with
-        let seeds = self.config.seeds.iter().filter(|seed| Some(**seed) != self.config.listen);
-        let known = self.mesh.authors().robots().count().max(seeds.count() + 1);
-        known <= 2 || self.mesh.heard_directly(self.handled_at, HEARD_WITHIN) >= 1
+        let known = self.mesh.authors().count().max(self.seeds_of_others + 1);
+        known <= 2 || self.mesh.hears_somebody(self.handled_at, HEARD_WITHIN)
     }
 
     /// Whether enough is known of the others to compare.
@@ -129,8 +125,7 @@ impl Brain {
         if !self.may_hold(&self.me) || self.desk.is_minting() || self.desk.is_broken() {
             return false;
         }
-        let others = self.config.seeds.iter().filter(|seed| Some(**seed) != self.config.listen);
-        let all_heard = self.mesh.alive().count() >= others.count();
+        let all_heard = self.mesh.alive_count() >= self.seeds_of_others;
         // what this robot made before it lost its disk may still be known to others
         let since = now.since(self.started_at);
         let compared = !self.is_newborn() && (self.mesh.is_in_step() || since >= ALONE_AFTER);
@@ -141,16 +136,7 @@ impl Brain {
     /// What the holder said of its succession, when it speaks of the present term.
     pub(super) fn succession(&self) -> Option<&SuccessionReport> {
         let role = self.role()?;
-        let author = self.mesh.authors().author(&role.holder)?;
-        let said = author.reports().find_map(|report| match report {
-            Report::Succession(said) => Some(said),
-            Report::Facts(_)
-            | Report::Host(_)
-            | Report::Link(..)
-            | Report::Instance(_)
-            | Report::Condition(_)
-            | Report::Homeless(_) => None,
-        });
+        let said = self.mesh.authors().author(&role.holder)?.succession();
         said.filter(|said| said.term == role.term)
     }
 

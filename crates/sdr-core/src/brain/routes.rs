@@ -1,6 +1,6 @@
 //! Which ports cross robots, seen from here.
 
-use alloc::{collections::BTreeSet, vec::Vec};
+use alloc::{collections::BTreeSet, sync::Arc, vec::Vec};
 
 use super::{Brain, instances::Told, reconcile::Duty, systems::SystemNow};
 use crate::{
@@ -15,9 +15,8 @@ impl Brain {
     /// Tells the data plane when the wanted set changed.
     pub(super) fn update_routes(&mut self) {
         let mut routes = Vec::new();
-        let mut names: Vec<&Name> = self.index.mine.iter().map(|key| &key.system).collect();
-        names.dedup();
-        for system in names.into_iter().filter_map(|name| self.systems.get(name)) {
+        let names = self.index.my_systems();
+        for system in names.filter_map(|name| self.systems.get(name)) {
             self.routes_of(system, &mut routes);
         }
         if routes != self.routes {
@@ -35,7 +34,7 @@ impl Brain {
         for output in outputs {
             let producer = system.key(&output.component);
             let wires: Vec<&ConnectionSpec> =
-                system.connections.iter().filter(|c| c.from == output).collect();
+                system.connections.iter().filter(|c| c.from == output).map(|c| &**c).collect();
             let producers = self.places(&producer, Side::Producer);
             let consumers: BTreeSet<RobotId> = wires
                 .iter()
@@ -95,7 +94,7 @@ impl Brain {
     /// Whether the routes of a prepared instance have found their peers.
     pub(super) fn routes_matched(&self, key: &ComponentKey) -> bool {
         let Some(system) = self.systems.get(&key.system) else { return true };
-        let touches = |wire: &&ConnectionSpec| {
+        let touches = |wire: &&Arc<ConnectionSpec>| {
             wire.from.component == key.name || wire.to.component == key.name
         };
         system.connections.iter().filter(touches).all(|wire| {

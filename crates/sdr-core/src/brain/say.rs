@@ -9,7 +9,7 @@ use alloc::{
 use super::{Brain, judge::Calls};
 use crate::{
     allocate::Homeless,
-    id::{ComponentKey, RobotId},
+    id::{ComponentKey, NAME_BYTES_MAX, RobotId},
     input::InstanceId,
     mesh::{AuthorKey, Push},
     report::{HostReport, InstanceReport, LinkReport, Report, Usage},
@@ -105,7 +105,6 @@ impl Brain {
     }
 
     pub(super) fn say(&mut self, now: Instant) {
-        self.unsay_unwanted();
         if core::mem::take(&mut self.usage_due) {
             self.say_instances(now);
         }
@@ -162,24 +161,27 @@ impl Brain {
         }
         let mut links: BTreeMap<RobotId, LinkReport> = BTreeMap::new();
         let mut others = Vec::new();
-        for (robot, link) in self.mesh.links() {
+        let measured = |robot: &RobotId| Some((robot.clone(), self.mesh.link(robot)?));
+        for robot in self.mesh.linked() {
             if matter.contains(robot) {
-                links.insert(robot.clone(), link);
+                links.extend(measured(robot));
             } else {
                 // those said before stay; others on every robot
                 let before = self.said.links.contains_key(robot);
                 let measured = !sampled || self.mesh.link_noise(robot) <= LINK_NOISE_MAX;
                 if before || measured {
-                    let names = [self.me.as_str(), robot.as_str()].concat();
-                    let hash = crate::order::hash64(names.as_bytes());
-                    others.push(((!before, hash), robot.clone(), link));
+                    let mut names = [0; 2 * NAME_BYTES_MAX];
+                    let names = joined(&mut names, [self.me.as_str(), robot.as_str()]);
+                    others.push(((!before, crate::order::hash64(names)), robot));
                 }
             }
         }
-        others.sort_unstable_by_key(|(rank, ..)| *rank);
         let share = LINKS_SAID_BY_ALL / fleet.max(1);
         let room = share.clamp(LINKS_SAID_MIN, LINKS_SAID).saturating_sub(links.len());
-        links.extend(others.into_iter().take(room).map(|(_, robot, link)| (robot, link)));
+        if others.len() > room {
+            others.select_nth_unstable(room);
+        }
+        links.extend(others.into_iter().take(room).filter_map(|(_, robot)| measured(robot)));
         links
     }
 
@@ -238,7 +240,7 @@ impl Brain {
     }
 
     /// Takes back what was said of components that nobody wants any more.
-    fn unsay_unwanted(&mut self) {
+    pub(super) fn unsay_unwanted(&mut self) {
         let gone = |key: &&ComponentKey| {
             let system = self.systems.get(&key.system);
             system.and_then(|system| system.component(&key.name)).is_none()
@@ -270,6 +272,16 @@ impl Brain {
 
 fn same_but_usage(before: &InstanceReport, now: &InstanceReport) -> bool {
     InstanceReport { usage: now.usage, ..before.clone() } == *now
+}
+
+/// Two words one behind the other.
+fn joined<'a>(bytes: &'a mut [u8; 2 * NAME_BYTES_MAX], words: [&str; 2]) -> &'a [u8] {
+    let mut used = 0;
+    for word in words {
+        bytes[used..used + word.len()].copy_from_slice(word.as_bytes());
+        used += word.len();
+    }
+    &bytes[..used]
 }
 
 /// Whether figures of a component are worth saying again.

@@ -45,9 +45,8 @@ impl Brain {
             spares.into_iter().for_each(|id| self.finish(id));
             return;
         }
-        let shape = self.shape(key);
         for id in spares {
-            if Some(self.instances[&id].shape) != shape {
+            if self.is_old_edition(id, key) {
                 self.finish(id);
             }
         }

@@ -34,7 +34,7 @@ impl Brain {
         let mine = (*robot == self.me).then_some(self.host).flatten();
         let host = mine.or_else(|| self.host_of(robot).copied()).unwrap_or_default();
         let capacity = facts.map(|facts| facts.memory_capacity).unwrap_or_default();
-        let link = self.mesh.links().find(|(other, _)| *other == robot).map(|(_, link)| link);
+        let link = self.mesh.link(robot);
         let author = self.mesh.authors().author(robot);
         let conditions = author.into_iter().flat_map(|author| author.reports());
         RobotView {

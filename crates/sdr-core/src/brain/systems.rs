@@ -11,8 +11,10 @@ use alloc::{
 use super::Brain;
 use crate::{
     id::{ComponentKey, Name, RobotId},
+    mesh::Fact,
     order::Version,
     record::{Assignment, FleetKey, FleetValue, RecordKind, SystemRecord},
+    report::{HostReport, InstanceReport, RobotFacts},
     spec::{ComponentSpec, ConnectionSpec, PolicyBytes},
 };
 
@@ -27,11 +29,11 @@ pub(super) struct SystemNow {
     pub(super) since: u64,
     pub(super) receiver: RobotId,
     /// In the order of the file.
-    pub(super) components: Vec<ComponentSpec>,
+    pub(super) components: Vec<Arc<ComponentSpec>>,
     /// In the order of the file.
-    pub(super) connections: Vec<ConnectionSpec>,
-    pub(super) allocation: PolicyBytes,
-    pub(super) recovery: PolicyBytes,
+    pub(super) connections: Vec<Arc<ConnectionSpec>>,
+    pub(super) allocation: Arc<PolicyBytes>,
+    pub(super) recovery: Arc<PolicyBytes>,
 }
 
 impl SystemNow {
@@ -44,7 +46,7 @@ impl SystemNow {
     }
 
     pub(super) fn component(&self, name: &Name) -> Option<&ComponentSpec> {
-        self.components.iter().find(|component| component.name == *name)
+        self.components.iter().find(|component| component.name == *name).map(|spec| &**spec)
     }
 }
 
@@ -97,7 +99,12 @@ impl Brain {
             }
         }
         for key in keys {
+            let touched = self.index.touches(&key.system);
             self.reindex(&key);
+            self.stir.here |= touched || self.index.touches(&key.system);
+        }
+        if !changed.systems.is_empty() {
+            self.unsay_unwanted();
         }
     }
 
@@ -120,11 +127,16 @@ impl Brain {
         );
         let new = whole.map(Arc::new);
         keys.extend(before.iter().chain(&new).flat_map(|s| s.keys().collect::<Vec<_>>()));
+        if let Some(system) = &new {
+            self.need_objector(&system.recovery);
+        }
         match new {
             Some(system) => self.systems.insert(name.clone(), system),
             None => self.systems.remove(&name),
         };
-        self.update_objectors();
+        if let Some(system) = &before {
+            self.spare_objector(&system.recovery);
+        }
         if redeployed || self.systems.contains_key(&name) != before.is_some() {
             self.begin_anew(&name, keys);
         }
@@ -144,29 +156,31 @@ impl Brain {
 
     fn assemble(&self, of: &Version, record: &SystemRecord) -> Option<SystemNow> {
         let fleet = self.mesh.fleet();
+        let policy = |kind| match fleet.get(kind, record.name.as_str()) {
+            Some((version, FleetValue::Allocation(policy) | FleetValue::Recovery(policy)))
+                if version == of =>
+            {
+                Some(Arc::clone(policy))
+            }
+            Some(_) | None => None,
+        };
+        let allocation = policy(RecordKind::ALLOCATION)?;
+        let recovery = policy(RecordKind::RECOVERY)?;
         let prefix = format!("{}/", record.name);
         let current =
             |key: &FleetKey, version: &Version| key.name.starts_with(&prefix) && version == of;
         let mut components = Vec::new();
         for (key, version, value) in fleet.below(RecordKind::COMPONENT, &prefix) {
             if let (true, FleetValue::Component(spec)) = (current(key, version), value) {
-                components.push(spec.clone());
+                components.push(Arc::clone(spec));
             }
         }
         let mut connections = Vec::new();
         for (key, version, value) in fleet.below(RecordKind::CONNECTION, &prefix) {
             if let (true, FleetValue::Connection(spec)) = (current(key, version), value) {
-                connections.push(spec.clone());
+                connections.push(Arc::clone(spec));
             }
         }
-        let policy = |kind| match fleet.get(kind, record.name.as_str()) {
-            Some((version, FleetValue::Allocation(policy) | FleetValue::Recovery(policy)))
-                if version == of =>
-            {
-                Some(policy.clone())
-            }
-            Some(_) | None => None,
-        };
         let whole = components.len() == usize::from(record.components)
             && connections.len() == usize::from(record.connections);
         if !whole {
@@ -182,24 +196,24 @@ impl Brain {
             receiver: record.receiver.clone(),
             components,
             connections,
-            allocation: policy(RecordKind::ALLOCATION)?,
-            recovery: policy(RecordKind::RECOVERY)?,
+            allocation,
+            recovery,
         })
     }
 
-    /// Where a wanted component should run, as far as somebody decided it.
+    /// Where a component should run, as far as somebody decided it.
     pub(super) fn assignment(&self, key: &ComponentKey) -> Option<(&Version, &Assignment)> {
-        match self.mesh.fleet().get(RecordKind::ASSIGNMENT, &key.to_string())? {
-            (version, FleetValue::Assignment(assignment)) => Some((version, assignment)),
-            (_, _) => None,
-        }
+        let fact = self.assignment_fact(key)?;
+        Some((fact.version(), fact.assignment()?))
+    }
+
+    pub(super) fn assignment_fact(&self, key: &ComponentKey) -> Option<&Arc<Fact>> {
+        self.mesh.fleet().fact(&FleetKey { kind: RecordKind::ASSIGNMENT, name: key.to_string() })
     }
 
     /// The assignment of a component whose system is wanted and whose home is chosen.
     pub(super) fn wanted(&self, key: &ComponentKey) -> Option<(&Version, &Assignment)> {
-        let system = self.systems.get(&key.system)?;
-        system.component(&key.name)?;
-        self.assignment(key).filter(|(_, assignment)| assignment.deployment >= system.since)
+        self.index.placed(key)
     }
 
     pub(super) fn home(&self, key: &ComponentKey) -> Option<&RobotId> {
@@ -207,47 +221,17 @@ impl Brain {
     }
 
     /// What `robot` says of its instance of a component.
-    pub(super) fn reported(
-        &self,
-        robot: &RobotId,
-        key: &ComponentKey,
-    ) -> Option<&crate::report::InstanceReport> {
-        self.mesh.authors().author(robot)?.reports().find_map(|report| match report {
-            crate::report::Report::Instance(instance) if instance.component == *key => {
-                Some(instance)
-            }
-            crate::report::Report::Instance(_)
-            | crate::report::Report::Facts(_)
-            | crate::report::Report::Host(_)
-            | crate::report::Report::Link(..)
-            | crate::report::Report::Condition(_)
-            | crate::report::Report::Succession(_)
-            | crate::report::Report::Homeless(_) => None,
-        })
+    pub(super) fn reported(&self, robot: &RobotId, key: &ComponentKey) -> Option<&InstanceReport> {
+        let author = self.mesh.authors().author(robot)?;
+        author.instances().find(|instance| instance.component == *key)
     }
 
-    pub(super) fn facts(&self, robot: &RobotId) -> Option<&crate::report::RobotFacts> {
-        self.mesh.authors().author(robot)?.reports().find_map(|report| match report {
-            crate::report::Report::Facts(facts) => Some(facts),
-            crate::report::Report::Instance(_)
-            | crate::report::Report::Host(_)
-            | crate::report::Report::Link(..)
-            | crate::report::Report::Condition(_)
-            | crate::report::Report::Succession(_)
-            | crate::report::Report::Homeless(_) => None,
-        })
+    pub(super) fn facts(&self, robot: &RobotId) -> Option<&RobotFacts> {
+        self.mesh.authors().author(robot)?.facts()
     }
 
-    pub(super) fn host_of(&self, robot: &RobotId) -> Option<&crate::report::HostReport> {
-        self.mesh.authors().author(robot)?.reports().find_map(|report| match report {
-            crate::report::Report::Host(host) => Some(host),
-            crate::report::Report::Instance(_)
-            | crate::report::Report::Facts(_)
-            | crate::report::Report::Link(..)
-            | crate::report::Report::Condition(_)
-            | crate::report::Report::Succession(_)
-            | crate::report::Report::Homeless(_) => None,
-        })
+    pub(super) fn host_of(&self, robot: &RobotId) -> Option<&HostReport> {
+        self.mesh.authors().author(robot)?.host()
     }
 
     /// Robots alive, this one included, by name.

@@ -64,8 +64,7 @@ impl Brain {
         }
         match self.succession() {
             Some(said) if said.order.contains(&self.me) => {
-                let link = self.mesh.links().find(|(robot, _)| *robot == holder);
-                let loss = link.map_or(Permille(0), |(_, link)| link.loss);
+                let loss = self.mesh.loss_to(holder).unwrap_or(Permille(0));
                 said.beat * self.role_policy().misses_at(loss)
             }
             Some(_) | None => quiet_after,
@@ -73,7 +72,7 @@ impl Brain {
     }
 
     fn is_pair(&self) -> bool {
-        self.mesh.authors().robots().count() <= 2
+        self.mesh.authors().count() <= 2
     }
 
     fn suspect(&mut self, now: Instant, holder: &RobotId, silent: Duration) {

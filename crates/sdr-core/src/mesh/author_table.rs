@@ -5,13 +5,16 @@
 
 use alloc::{
     collections::{BTreeMap, BTreeSet},
+    sync::Arc,
     vec::Vec,
 };
 
 use super::{
-    author::{Author, AuthorKey, Incarnation},
-    fleet_table::fold,
-    wire::{cut, last_of},
+    author::{Author, Incarnation, Learned},
+    commons::Commons,
+    fact::fold,
+    saying::AuthorKey,
+    wire::{AuthorDelta, cut, last_of},
 };
 use crate::{id::RobotId, order::hash64, report::Report};
 
@@ -83,10 +86,11 @@ pub struct AuthorTable {
     names_hash: u32,
     /// Own records that changed and wait for their release.
     staged: BTreeSet<AuthorKey>,
+    commons: Option<Arc<dyn Commons>>,
 }
 
 impl AuthorTable {
-    pub(super) fn new(me: RobotId, own: Incarnation) -> Self {
+    pub(super) fn new(me: RobotId, own: Incarnation, commons: Option<Arc<dyn Commons>>) -> Self {
         let author = Author::new(me.clone(), own);
         Self {
             hash: author.id,
@@ -98,6 +102,7 @@ impl AuthorTable {
             id_seats: Vec::from([Seat::OWN]),
             seats: Vec::from([author]),
             staged: BTreeSet::new(),
+            commons,
         }
     }
 
@@ -119,12 +124,13 @@ impl AuthorTable {
         &self.seats[seat.0]
     }
 
-    pub(super) fn at_mut(&mut self, seat: Seat) -> &mut Author {
-        &mut self.seats[seat.0]
+    /// Takes what an author said.
+    pub(super) fn learn(&mut self, seat: Seat, delta: AuthorDelta) -> Learned {
+        self.seats[seat.0].learn(delta, self.commons.as_deref())
     }
 
     /// Robots known, this one included.
-    pub(super) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.seats.len()
     }
 

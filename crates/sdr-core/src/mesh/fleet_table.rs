@@ -1,64 +1,24 @@
 //! What the fleet agrees on: key -> (version, value), merged by greatest version.
 
-use alloc::{
-    collections::{BTreeMap, BTreeSet},
-    string::String,
-    vec::Vec,
-};
-
-use serde::{Deserialize, Serialize};
+use alloc::{collections::BTreeSet, sync::Arc, vec::Vec};
 
 use super::{
+    commons::Commons,
+    fact::{Fact, Facts, FleetRecord, key_hash},
+    fact_index::ByHash,
     fleet_tree::{FleetTree, range_of},
-    wire::{FleetEntries, SECTION_BYTES_MAX},
+    wire::{FleetEntries, RecordRef},
 };
 use crate::{
-    effect::StoredRecord,
-    order::{Version, hash64},
+    order::Version,
     planted::{self, Defect},
-    record::{FleetKey, FleetValue, RECORD_BYTES_MAX, RecordKind},
+    record::{FleetKey, FleetValue, RecordKind, RoleRecord},
 };
 
 /// Most records; more are refused.
 const RECORDS_MAX: usize = 65_536;
-/// Longest name of a key.
-const KEY_BYTES_MAX: usize = 100;
-
-/// One shared fact with its version.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FleetRecord {
-    /// What it is about.
-    pub key: FleetKey,
-    /// Which of two values stays.
-    pub version: Version,
-    /// The value, encoded.
-    pub value: Vec<u8>,
-}
-
-impl FleetRecord {
-    /// The record of `value` under `kind` and `name`.
-    pub fn new(kind: RecordKind, name: String, version: Version, value: &FleetValue) -> Self {
-        Self { key: FleetKey { kind, name }, version, value: value.encode() }
-    }
-
-    /// Orders two records of one key: version, then hash, then bytes.
-    fn rank(&self) -> (&Version, u64, &[u8]) {
-        (&self.version, hash64(&self.value), &self.value)
-    }
-
-    /// Bytes in a datagram, at most.
-    pub(super) fn wire_len(&self) -> usize {
-        let epoch = self.version.epoch.as_ref();
-        let epoch = epoch.map_or(1, |epoch| epoch.minted_by.as_str().len() + 12);
-        let version = epoch + 20 + self.version.author.as_str().len() + 1;
-        self.value.len() + self.key.name.len() + version + 6
-    }
-
-    fn stamp(&self) -> u32 {
-        let bytes = postcard::to_allocvec(&self.version).expect("plain data");
-        fold(hash64(&bytes) ^ hash64(&self.value).rotate_left(17))
-    }
-}
+/// Changes kept for the disk; when there are more, all is told anew.
+const UNSAVED_MAX: usize = 65_536;
 
 /// What came of merging a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,58 +36,69 @@ pub enum Merge {
 /// The fleet table of one robot.
 #[derive(Clone, Debug, Default)]
 pub struct FleetTable {
-    records: BTreeMap<FleetKey, (FleetRecord, FleetValue)>,
-    /// (key hash, key) of all records.
-    hashes: BTreeSet<(u32, FleetKey)>,
+    facts: Facts,
+    by_hash: ByHash,
     tree: FleetTree,
+    /// Looked at with every input.
+    role: Option<Arc<Fact>>,
+    /// What changed since it was told last, for the disk.
+    unsaved: Vec<Arc<Fact>>,
+    unsaved_all: bool,
+    commons: Option<Arc<dyn Commons>>,
+}
+
+/// What changed in a table.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TableChange {
+    /// Facts that are new or greater.
+    pub facts: Vec<Arc<Fact>>,
+    /// Keys that are gone.
+    pub dropped: Vec<FleetKey>,
 }
 
 impl FleetTable {
-    /// The table as it was on disk; records that cannot be read are left out.
-    pub fn from_stored(stored: Vec<StoredRecord>) -> Self {
-        let mut table = Self::default();
-        for StoredRecord { key, version, value } in stored {
-            table.merge(FleetRecord { key, version, value });
+    /// The table that holds `facts`, and shares what it holds with others through `commons`.
+    pub fn new(facts: &Facts, commons: Option<Arc<dyn Commons>>) -> Self {
+        let mut table = Self { commons, ..Self::default() };
+        for fact in facts.iter() {
+            table.merge_fact(Arc::clone(fact));
         }
         table
     }
 
-    /// The table as it should be on disk.
-    pub fn to_stored(&self) -> Vec<StoredRecord> {
-        let stored = |record: &FleetRecord| StoredRecord {
-            key: record.key.clone(),
-            version: record.version.clone(),
-            value: record.value.clone(),
-        };
-        self.records.values().map(|(record, _)| stored(record)).collect()
+    /// Through what its facts are shared.
+    pub(super) fn commons(&self) -> Option<Arc<dyn Commons>> {
+        self.commons.clone()
+    }
+
+    /// All facts, by key.
+    pub fn facts(&self) -> &Facts {
+        &self.facts
     }
 
     /// Takes `record` when it is greater than what is known.
     pub fn merge(&mut self, record: FleetRecord) -> Merge {
-        if record.value.len() > RECORD_BYTES_MAX
-            || record.key.name.len() > KEY_BYTES_MAX
-            || record.wire_len() > SECTION_BYTES_MAX
-        {
-            return Merge::Refused;
+        let hash = key_hash(record.key.kind, &record.key.name);
+        let known = self.find(hash, record.key.kind, &record.key.name);
+        if known.is_some_and(|known| *known.record() == record) {
+            return Merge::Known;
         }
-        let Ok(value) = FleetValue::decode(record.key.kind, &record.value) else {
-            return Merge::Refused;
-        };
-        if self.is_outdated(&record) {
-            return Merge::Older;
+        let shared = self.commons.as_ref().and_then(|commons| commons.fact(&record));
+        match shared.or_else(|| Fact::read(record)) {
+            Some(fact) => self.merge_fact(fact),
+            None => Merge::Refused,
         }
-        match self.records.get(&record.key) {
-            Some((known, _)) if *known == record => return Merge::Known,
-            Some((known, _))
-                if known.rank() > record.rank() && !planted::is(Defect::NoVersionOrder) =>
-            {
-                return Merge::Older;
-            }
-            None if self.records.len() >= RECORDS_MAX => return Merge::Refused,
-            Some(_) | None => {}
+    }
+
+    fn merge_fact(&mut self, fact: Arc<Fact>) -> Merge {
+        match self.judge(&fact) {
+            Merge::News => {}
+            Merge::Known => return Merge::Known,
+            Merge::Older => return Merge::Older,
+            Merge::Refused => return Merge::Refused,
         }
-        let system = match &value {
-            FleetValue::System(_) => Some((record.key.name.clone(), record.version.clone())),
+        let system = match fact.value() {
+            FleetValue::System(_) => Some((fact.key().name.clone(), fact.version().clone())),
             FleetValue::Component(_)
             | FleetValue::Connection(_)
             | FleetValue::Allocation(_)
@@ -137,7 +108,10 @@ impl FleetTable {
             | FleetValue::RolePolicy(_)
             | FleetValue::Unknown => None,
         };
-        self.put(record, value);
+        if let Some(commons) = &self.commons {
+            commons.keep_fact(&fact);
+        }
+        self.put(fact);
         if planted::is(Defect::TombstoneDropped) {
             self.drop_tombstones();
         }
@@ -147,34 +121,72 @@ impl FleetTable {
         Merge::News
     }
 
-    /// The value under a key.
-    pub fn get(&self, kind: RecordKind, name: &str) -> Option<(&Version, &FleetValue)> {
-        let key = FleetKey { kind, name: String::from(name) };
-        self.records.get(&key).map(|(record, value)| (&record.version, value))
+    /// What would come of merging a fact.
+    pub fn judge(&self, fact: &Fact) -> Merge {
+        if self.is_outdated(fact.record()) {
+            return Merge::Older;
+        }
+        let known = self.find(fact.hash(), fact.key().kind, &fact.key().name);
+        match known.map(|known| (known, known.record().rank(fact.record()))) {
+            Some((known, _)) if **known == *fact => Merge::Known,
+            Some((_, core::cmp::Ordering::Greater)) if !planted::is(Defect::NoVersionOrder) => {
+                Merge::Older
+            }
+            None if self.facts.len() >= RECORDS_MAX => Merge::Refused,
+            Some(_) | None => Merge::News,
+        }
     }
 
-    /// The record under a key, and its value.
-    pub fn entry(&self, key: &FleetKey) -> Option<&(FleetRecord, FleetValue)> {
-        self.records.get(key)
+    /// Whether a record that came says what is known.
+    pub(super) fn holds(&self, record: &RecordRef<'_>) -> bool {
+        let hash = key_hash(record.kind(), record.name());
+        let known = self.find(hash, record.kind(), record.name());
+        known.is_some_and(|known| record.is(known)) && !planted::is(Defect::EndlessEcho)
+    }
+
+    /// The value under a key.
+    pub fn get(&self, kind: RecordKind, name: &str) -> Option<(&Version, &FleetValue)> {
+        let fact = self.find(key_hash(kind, name), kind, name)?;
+        Some((fact.version(), fact.value()))
+    }
+
+    /// Who holds the coordinator role.
+    pub fn role(&self) -> Option<&RoleRecord> {
+        match self.role.as_ref()?.value() {
+            FleetValue::Role(role) => Some(role),
+            FleetValue::System(_)
+            | FleetValue::Component(_)
+            | FleetValue::Connection(_)
+            | FleetValue::Allocation(_)
+            | FleetValue::Recovery(_)
+            | FleetValue::Assignment(_)
+            | FleetValue::RolePolicy(_)
+            | FleetValue::Unknown => None,
+        }
+    }
+
+    /// The fact under a key.
+    pub fn fact(&self, key: &FleetKey) -> Option<&Arc<Fact>> {
+        self.find(key_hash(key.kind, &key.name), key.kind, &key.name)
     }
 
     /// The record under a key.
     pub fn record(&self, key: &FleetKey) -> Option<&FleetRecord> {
-        self.records.get(key).map(|(record, _)| record)
+        self.fact(key).map(|fact| fact.record())
     }
 
     /// What makes an offered record of this key old: the greater one, or that of its system.
     pub(super) fn newer_than(&self, key: &FleetKey) -> Option<&FleetRecord> {
         let system = || {
-            let name = String::from(system_of_part(key)?);
-            self.record(&FleetKey { kind: RecordKind::SYSTEM, name })
+            let name = system_of_part(key)?;
+            self.find(key_hash(RecordKind::SYSTEM, name), RecordKind::SYSTEM, name)
         };
-        self.record(key).or_else(system)
+        self.fact(key).or_else(system).map(|fact| fact.record())
     }
 
     /// All records, by key.
     pub fn records(&self) -> impl Iterator<Item = (&FleetRecord, &FleetValue)> {
-        self.records.values().map(|(record, value)| (record, value))
+        self.facts.iter().map(|fact| (fact.record(), fact.value()))
     }
 
     /// All values of a kind, by name.
@@ -182,11 +194,7 @@ impl FleetTable {
         &self,
         kind: RecordKind,
     ) -> impl Iterator<Item = (&FleetKey, &Version, &FleetValue)> {
-        let from = FleetKey { kind, name: String::new() };
-        self.records
-            .range(from..)
-            .take_while(move |(key, _)| key.kind == kind)
-            .map(|(key, (record, value))| (key, &record.version, value))
+        self.below(kind, "")
     }
 
     /// All values of a kind whose names begin with `prefix`, by name.
@@ -195,11 +203,28 @@ impl FleetTable {
         kind: RecordKind,
         prefix: &'a str,
     ) -> impl Iterator<Item = (&'a FleetKey, &'a Version, &'a FleetValue)> {
-        let from = FleetKey { kind, name: String::from(prefix) };
-        self.records
-            .range(from..)
-            .take_while(move |(key, _)| key.kind == kind && key.name.starts_with(prefix))
-            .map(|(key, (record, value))| (key, &record.version, value))
+        self.facts
+            .from(kind, prefix)
+            .take_while(move |fact| fact.key().kind == kind && fact.key().name.starts_with(prefix))
+            .map(|fact| (fact.key(), fact.version(), fact.value()))
+    }
+
+    /// What changed since the last call; `None` when it is too much to tell apart.
+    pub fn take_change(&mut self) -> Option<TableChange> {
+        let mut touched = core::mem::take(&mut self.unsaved);
+        if core::mem::take(&mut self.unsaved_all) {
+            return None;
+        }
+        touched.sort_by(|a, b| (a.hash(), a.key()).cmp(&(b.hash(), b.key())));
+        touched.dedup_by(|a, b| a.key() == b.key());
+        let mut change = TableChange::default();
+        for fact in touched {
+            match self.find(fact.hash(), fact.key().kind, &fact.key().name) {
+                Some(now) => change.facts.push(Arc::clone(now)),
+                None => change.dropped.push(fact.key().clone()),
+            }
+        }
+        Some(change)
     }
 
     /// One hash over all records: equal tables have equal ones.
@@ -209,12 +234,12 @@ impl FleetTable {
 
     /// How many records there are.
     pub fn len(&self) -> usize {
-        self.records.len()
+        self.facts.len()
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.records.is_empty()
+        self.facts.is_empty()
     }
 
     /// Hashes of the table.
@@ -230,10 +255,9 @@ impl FleetTable {
     /// All of a node in pieces of at most `entries_max` entries, by key hash.
     pub(super) fn pieces(&self, depth: u8, prefix: u16, entries_max: usize) -> Vec<FleetEntries> {
         let (mut low, high) = range_of(depth, prefix);
-        let mut entries: Vec<(u32, u32)> = self
-            .in_range(low, high)
-            .map(|record| (key_hash(&record.key), record.stamp()))
-            .collect();
+        let mut entries: Vec<(u32, u32)> =
+            self.in_range(low, high).map(|fact| (fact.hash(), fact.stamp())).collect();
+        entries.sort_unstable();
         let mut pieces = Vec::new();
         while entries.len() > entries_max {
             let rest = entries.split_off(entries_max);
@@ -248,46 +272,69 @@ impl FleetTable {
 
     /// Records that a sender of `piece` lacks or holds differently, at most `max`.
     pub(super) fn missing_from(&self, piece: &FleetEntries, max: usize) -> Vec<FleetRecord> {
-        let lacking = self.in_range(piece.low, piece.high).filter(|record| {
-            piece.entries.binary_search(&(key_hash(&record.key), record.stamp())).is_err()
-        });
-        lacking.take(max).cloned().collect()
+        let lacking = self
+            .in_range(piece.low, piece.high)
+            .filter(|fact| piece.entries.binary_search(&(fact.hash(), fact.stamp())).is_err());
+        lacking.take(max).map(|fact| fact.record().clone()).collect()
     }
 
     /// Key hashes of what the sender of `piece` holds and this table lacks or holds
     /// differently.
     pub(super) fn wanted_of(&self, piece: &FleetEntries) -> Vec<u32> {
         let held = self.in_range(piece.low, piece.high);
-        let held: BTreeSet<(u32, u32)> =
-            held.map(|record| (key_hash(&record.key), record.stamp())).collect();
+        let held: BTreeSet<(u32, u32)> = held.map(|fact| (fact.hash(), fact.stamp())).collect();
         let lacking = piece.entries.iter().filter(|entry| !held.contains(entry));
         lacking.map(|(key, _)| *key).collect()
     }
 
     /// Records by key hash.
     pub(super) fn by_hash(&self, key_hash: u32) -> impl Iterator<Item = &FleetRecord> {
-        self.in_range(key_hash, key_hash)
+        self.in_range(key_hash, key_hash).map(|fact| fact.record())
     }
 
-    fn in_range(&self, low: u32, high: u32) -> impl Iterator<Item = &FleetRecord> {
-        let from = (low, FleetKey { kind: RecordKind(0), name: String::new() });
-        let ordered = (low <= high).then(|| self.hashes.range(from..));
-        ordered
-            .into_iter()
-            .flatten()
-            .take_while(move |(hash, _)| *hash <= high)
-            .map(|(_, key)| &self.records[key].0)
+    /// Parts of a system of versions before this one.
+    pub fn parts_before(&self, system: &str, version: &Version) -> Vec<FleetKey> {
+        let kinds = [
+            RecordKind::COMPONENT,
+            RecordKind::CONNECTION,
+            RecordKind::ALLOCATION,
+            RecordKind::RECOVERY,
+        ];
+        let mut outdated = Vec::new();
+        for kind in kinds {
+            let parts = self.below(kind, system);
+            let old = parts
+                .filter(|(key, known, _)| system_of_part(key) == Some(system) && *known < version);
+            outdated.extend(old.map(|(key, _, _)| key.clone()));
+        }
+        outdated
     }
 
-    fn put(&mut self, record: FleetRecord, value: FleetValue) {
-        let hash = key_hash(&record.key);
-        self.tree.toggle(hash, record.stamp());
-        let key = record.key.clone();
-        match self.records.insert(key.clone(), (record, value)) {
-            Some((before, _)) => self.tree.toggle(hash, before.stamp()),
-            None => {
-                self.hashes.insert((hash, key));
-            }
+    fn find(&self, hash: u32, kind: RecordKind, name: &str) -> Option<&Arc<Fact>> {
+        self.by_hash.find(hash, |fact| fact.key().kind == kind && fact.key().name == name)
+    }
+
+    fn in_range(&self, low: u32, high: u32) -> impl Iterator<Item = &Fact> {
+        self.by_hash.range(low, high).map(|fact| &**fact)
+    }
+
+    fn put(&mut self, fact: Arc<Fact>) {
+        self.tree.toggle(fact.hash(), fact.stamp());
+        self.by_hash.put(&fact);
+        if fact.key().kind == RecordKind::ROLE && fact.key().name.is_empty() {
+            self.role = Some(Arc::clone(&fact));
+        }
+        self.note_unsaved(&fact);
+        if let Some(before) = self.facts.put(fact) {
+            self.tree.toggle(before.hash(), before.stamp());
+        }
+    }
+
+    fn note_unsaved(&mut self, fact: &Arc<Fact>) {
+        if self.unsaved.len() < UNSAVED_MAX {
+            self.unsaved.push(Arc::clone(fact));
+        } else {
+            self.unsaved_all = true;
         }
     }
 
@@ -295,19 +342,19 @@ impl FleetTable {
     fn drop_tombstones(&mut self) {
         let is_dead = |value: &FleetValue| matches!(value, FleetValue::System(s) if !s.wanted);
         let dead: Vec<FleetKey> = self
-            .records
+            .facts
             .iter()
-            .filter(|(_, (_, value))| is_dead(value))
-            .map(|(key, _)| key.clone())
+            .filter(|fact| is_dead(fact.value()))
+            .map(|fact| fact.key().clone())
             .collect();
-        dead.iter().for_each(|key| self.drop_record(key));
+        dead.iter().for_each(|key| self.drop_fact(key));
     }
 
-    fn drop_record(&mut self, key: &FleetKey) {
-        if let Some((record, _)) = self.records.remove(key) {
-            let hash = key_hash(key);
-            self.tree.toggle(hash, record.stamp());
-            self.hashes.remove(&(hash, key.clone()));
+    fn drop_fact(&mut self, key: &FleetKey) {
+        if let Some(fact) = self.facts.remove(key) {
+            self.tree.toggle(fact.hash(), fact.stamp());
+            self.by_hash.remove(&fact);
+            self.note_unsaved(&fact);
         }
     }
 
@@ -319,26 +366,8 @@ impl FleetTable {
     }
 
     fn drop_parts_before(&mut self, system: &str, version: &Version) {
-        let kinds = [
-            RecordKind::COMPONENT,
-            RecordKind::CONNECTION,
-            RecordKind::ALLOCATION,
-            RecordKind::RECOVERY,
-        ];
-        let mut outdated = Vec::new();
-        for kind in kinds {
-            let from = FleetKey { kind, name: String::from(system) };
-            let parts = self
-                .records
-                .range(from..)
-                .take_while(|(key, _)| key.kind == kind && key.name.starts_with(system));
-            let old = parts.filter(|(key, (record, _))| {
-                system_of_part(key) == Some(system) && record.version < *version
-            });
-            outdated.extend(old.map(|(key, _)| key.clone()));
-        }
-        for key in outdated {
-            self.drop_record(&key);
+        for key in self.parts_before(system, version) {
+            self.drop_fact(&key);
         }
     }
 }
@@ -353,15 +382,4 @@ fn system_of_part(key: &FleetKey) -> Option<&str> {
             | RecordKind::RECOVERY
     );
     part.then(|| key.name.split('/').next().unwrap_or(&key.name))
-}
-
-/// Where a key stands in the tree.
-fn key_hash(key: &FleetKey) -> u32 {
-    fold(hash64(key.name.as_bytes()) ^ (u64::from(key.kind.0) << 56))
-}
-
-/// Folds 64 bits to 32 after mixing, so that similar inputs part.
-pub(super) fn fold(hash: u64) -> u32 {
-    let mixed = hash.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    u32::try_from((mixed >> 32) & 0xffff_ffff).unwrap_or(0)
 }

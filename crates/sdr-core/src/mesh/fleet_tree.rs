@@ -2,7 +2,7 @@
 
 use alloc::{vec, vec::Vec};
 
-use super::fleet_table::fold;
+use super::fact::fold;
 
 /// Deepest level that has hashes of its own: 16^3 nodes.
 pub(super) const DEPTH_MAX: u8 = 3;

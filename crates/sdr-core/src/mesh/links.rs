@@ -1,10 +1,7 @@
 //! Round trips, jitter and loss of every pair that talks, from numbers that ride on
 //! whatever is sent anyway.
 
-use alloc::{
-    collections::{BTreeMap, VecDeque},
-    vec::Vec,
-};
+use alloc::collections::{BTreeMap, VecDeque};
 use core::time::Duration;
 
 use super::{
@@ -108,6 +105,34 @@ impl Links {
     pub(super) fn noise(&self, seat: Seat) -> Permille {
         self.links.get(&seat).map_or(Permille(1000), Link::noise)
     }
+
+    /// The loss of the link to one robot alone.
+    pub(super) fn loss(
+        &self,
+        seat: Seat,
+        now: Instant,
+        silent_after: Duration,
+    ) -> Option<Permille> {
+        let link = self.links.get(&seat).filter(|link| link.came.is_some())?;
+        Some(link.loss(now, silent_after).0)
+    }
+
+    /// Robots that were heard.
+    pub(super) fn heard(&self) -> impl Iterator<Item = Seat> {
+        let known = self.links.iter().filter(|(_, link)| link.came.is_some());
+        known.map(|(seat, _)| *seat)
+    }
+
+    /// The same of one robot.
+    pub(super) fn report(
+        &self,
+        seat: Seat,
+        now: Instant,
+        silent_after: Duration,
+    ) -> Option<LinkReport> {
+        let link = self.links.get(&seat).filter(|link| link.came.is_some())?;
+        Some(link.report(now, silent_after))
+    }
 }
 
 impl Link {
@@ -191,20 +216,28 @@ impl Link {
         Permille((2 * variance).isqrt())
     }
 
-    fn report(&self, now: Instant, silent_after: Duration) -> LinkReport {
-        let mut sorted: Vec<Duration> = self.round_trips.iter().copied().collect();
-        sorted.sort_unstable();
+    /// Loss there or back, out, and in.
+    fn loss(&self, now: Instant, silent_after: Duration) -> (Permille, Permille, Permille) {
         let silent_after = silent_after.max(self.gap * SILENT_GAPS);
         let silent = self.came.is_some_and(|(_, at)| now.since(at) > silent_after);
         let loss_in = if silent { 1000 } else { u32::from(self.lost_in()) };
         let loss_out = self.lost_out(now);
         let both = 1000 - (1000 - loss_in) * (1000 - loss_out) / 1000;
+        (Permille(both), Permille(loss_out), Permille(loss_in))
+    }
+
+    fn report(&self, now: Instant, silent_after: Duration) -> LinkReport {
+        let mut sorted = [Duration::ZERO; SAMPLES];
+        let sorted = &mut sorted[..self.round_trips.len().min(SAMPLES)];
+        sorted.iter_mut().zip(&self.round_trips).for_each(|(to, from)| *to = *from);
+        sorted.sort_unstable();
+        let (loss, loss_out, loss_in) = self.loss(now, silent_after);
         LinkReport {
             rtt: sorted.get(sorted.len() / 2).copied().unwrap_or_default(),
             jitter: self.jitter,
-            loss: Permille(both),
-            loss_out: Permille(loss_out),
-            loss_in: Permille(loss_in),
+            loss,
+            loss_out,
+            loss_in,
         }
     }
 }

@@ -70,6 +70,8 @@ pub(super) struct Liveness {
     period: Duration,
     seen: Vec<Seen>,
     living: usize,
+    /// Grows when a robot begins or ceases to live.
+    edition: u64,
     /// Mean and mean deviation of how old news is when fresher comes, microseconds.
     gap_mean: u64,
     gap_deviation: u64,
@@ -86,6 +88,7 @@ impl Liveness {
             period,
             seen: Vec::new(),
             living: 0,
+            edition: 0,
             gap_mean: 0,
             gap_deviation: 0,
             gaps_count: 0,
@@ -124,11 +127,11 @@ impl Liveness {
         said_at: Instant,
         now: Instant,
     ) -> Heard {
-        let (quiet_after, gone_after) = (self.quiet(), self.gone());
-        let Some(seen) = self.seen.get_mut(seat.index()) else { return Heard::Nothing };
-        if heartbeat <= seen.heartbeat {
+        if self.seen.get(seat.index()).is_none_or(|seen| heartbeat <= seen.heartbeat) {
             return Heard::Nothing;
         }
+        let (quiet_after, gone_after) = (self.quiet(), self.gone());
+        let Some(seen) = self.seen.get_mut(seat.index()) else { return Heard::Nothing };
         let gap = now.since(seen.fresh_at);
         seen.heartbeat = heartbeat;
         seen.told = 0;
@@ -149,6 +152,7 @@ impl Liveness {
                 seen.standing = Standing::Alive;
                 let quiet_at = seen.fresh_at + quiet_after;
                 self.living += 1;
+                self.edition += 1;
                 self.wake_at(quiet_at, now);
                 Heard::Return
             }
@@ -193,6 +197,7 @@ impl Liveness {
                 Standing::Quiet => {
                     seen.standing = Standing::Gone;
                     self.living -= 1;
+                    self.edition += 1;
                     fallen.push((Seat::at(index), Standing::Gone));
                     continue;
                 }
@@ -267,6 +272,10 @@ impl Liveness {
     /// How many others are alive or quiet.
     pub(super) fn living_count(&self) -> usize {
         self.living
+    }
+
+    pub(super) fn edition(&self) -> u64 {
+        self.edition
     }
 
     pub(super) fn next_deadline(&self) -> Option<Instant> {

@@ -19,21 +19,27 @@
 
 mod author;
 mod author_table;
+mod commons;
+mod fact;
+mod fact_index;
 mod fleet_table;
 mod fleet_tree;
 mod inquiry;
 mod links;
 mod liveness;
 mod lives;
+mod near;
 mod news;
 mod outbox;
 mod peers;
 mod receive;
 mod repair;
 mod round;
+mod saying;
 mod spread;
 #[cfg(test)]
 mod tests;
+mod view;
 mod wire;
 
 use alloc::{
@@ -42,36 +48,34 @@ use alloc::{
 };
 use core::{net::SocketAddr, time::Duration};
 
-pub use author::{Author, AuthorKey, Incarnation};
+pub use author::{Author, Incarnation};
 pub use author_table::AuthorTable;
-pub use fleet_table::{FleetRecord, FleetTable, Merge};
+pub use commons::Commons;
+pub use fact::{Fact, Facts, FleetRecord};
+pub use fleet_table::{FleetTable, Merge, TableChange};
 pub use liveness::Standing;
 pub use lives::Memory;
 pub use news::{Inquiry, MeshConfig, MeshCounters, MeshNews, MeshTraffic, Push};
+pub use saying::{AuthorKey, Saying, Spoken};
 pub use wire::{
     AskNews, AskStamps, AuthorDelta, Beat, Beats, DATAGRAM_BYTES_MAX, Datagram, Echo, FleetEntries,
     FleetNodes, Header, LinkMark, News, PlacedBeat, Pulse, RosterPiece, SEAL_BYTES_MAX,
     SECTION_NAMES, Section, Sign, Stamp, Summary, WireError,
 };
 
-use crate::{
-    id::RobotId,
-    order::hash64,
-    report::{LinkReport, Report},
-    rng::Rng,
-    time::Instant,
-    units::Permille,
-};
+use crate::{id::RobotId, order::hash64, report::Report, rng::Rng, time::Instant, units::Permille};
 use author_table::{Admission, Seat};
 use inquiry::Inquiries;
 use links::Links;
 use liveness::Liveness;
 use lives::Newborn;
+use near::Near;
 use peers::Peers;
 use repair::Repair;
 pub use round::BeatsFor;
 use round::{Guard, Told};
 use spread::Spread;
+use wire::RecordRef;
 
 /// Fleets with at most so many others are told whole in each datagram ...
 const FLEET_TOLD: usize = 100;
@@ -100,6 +104,7 @@ pub struct Mesh {
     liveness: Liveness,
     links: Links,
     peers: Peers,
+    near: Near,
     spread: Spread,
     repair: Repair,
     told: Told,
@@ -127,10 +132,11 @@ impl Mesh {
         let mut liveness = Liveness::new(config.gone_after, config.period, now);
         liveness.reset(Seat::OWN);
         Self {
-            authors: AuthorTable::new(config.robot.clone(), own),
+            authors: AuthorTable::new(config.robot.clone(), own, fleet.commons()),
             liveness,
             links: Links::default(),
             peers: Peers::new(known, config.listen),
+            near: Near::default(),
             spread: Spread::default(),
             repair: Repair::default(),
             told: Told::default(),
@@ -157,7 +163,8 @@ impl Mesh {
     /// Takes a datagram; garbage is counted and dropped.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, bytes: &[u8]) {
         self.clock = now;
-        match Datagram::decode(bytes, self.config.fleet) {
+        let known = |record: &RecordRef<'_>| self.fleet.holds(record);
+        match Datagram::decode_news(bytes, self.config.fleet, &known) {
             Ok(datagram) if datagram.header.from == self.config.robot => {
                 self.handle_own_name(from, &datagram.header);
             }
@@ -279,70 +286,10 @@ impl Mesh {
         &self.fleet
     }
 
-    /// What is judged of `robot`; this robot itself is alive.
-    pub fn standing(&self, robot: &RobotId) -> Standing {
-        match self.authors.seat(robot) {
-            Some(Seat::OWN) => Standing::Alive,
-            Some(seat) => self.liveness.standing(seat),
-            None => Standing::Unheard,
-        }
-    }
-
-    /// Whether `robot` is alive or quiet; always so of this robot.
-    pub fn is_alive(&self, robot: &RobotId) -> bool {
-        matches!(self.standing(robot), Standing::Alive | Standing::Quiet)
-    }
-
-    /// Whether this robot hears nobody at all, though somebody was alive.
-    pub fn is_isolated(&self) -> bool {
-        self.liveness.is_isolated()
-    }
-
-    /// Whether some other robot held the very same fleet table at least once since the start:
-    /// what this robot missed while it was away is known by now.
-    pub fn is_in_step(&self) -> bool {
-        self.in_step
-    }
-
-    /// How long ago `robot` said the last that is known of it, by any path.
-    pub fn age(&self, robot: &RobotId, now: Instant) -> Option<Duration> {
-        match self.authors.seat(robot)? {
-            Seat::OWN => Some(Duration::ZERO),
-            seat => {
-                let seen = self.liveness.get(seat)?;
-                (seen.standing != Standing::Unheard).then(|| now.since(seen.fresh_at))
-            }
-        }
-    }
-
-    /// How many other robots were heard without a relay in the last `within`.
-    pub fn heard_directly(&self, now: Instant, within: Duration) -> usize {
-        let recent = |at: Instant| now.since(at) <= within;
-        self.liveness.all().filter(|(_, seen)| seen.direct_at.is_some_and(recent)).count()
-    }
-
-    /// What came of the last [`Mesh::ask_about`] this robot, for ten seconds.
-    pub fn inquiry(&self, robot: &RobotId) -> Option<Inquiry> {
-        self.inquiries.get(robot)
-    }
-
-    /// The ages at which a robot is quiet and gone at present: as configured, or longer in a
-    /// fleet where news usually takes longer.
-    pub fn patience(&self) -> (Duration, Duration) {
-        (self.liveness.quiet(), self.liveness.gone())
-    }
-
-    /// Other robots that are alive or quiet.
-    pub fn alive(&self) -> impl Iterator<Item = &RobotId> {
-        self.liveness.living().map(|(seat, _)| &self.authors.at(seat).robot)
-    }
-
-    /// Links of this robot, measured by it.
-    pub fn links(&self) -> impl Iterator<Item = (&RobotId, LinkReport)> {
-        let cycle = self.config.period * u32::try_from(self.authors.count()).unwrap_or(u32::MAX);
-        let silent_after = (cycle * 6).max(self.config.gone_after / 2);
-        let reports = self.links.reports(self.clock, silent_after);
-        reports.map(|(seat, report)| (&self.authors.at(seat).robot, report))
+    /// What changed in the fleet table since the last call, for the disk; `None` when it is
+    /// too much to tell apart.
+    pub fn take_change(&mut self) -> Option<TableChange> {
+        self.fleet.take_change()
     }
 
     /// How far the loss of the link to `robot` differs by chance from one count to the next,

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 use core::{net::SocketAddr, time::Duration};
 
+use super::Spoken;
 use crate::{id::RobotId, record::FleetKey, time::Instant};
 
 /// What is settled at the start.
@@ -27,7 +28,7 @@ pub struct MeshConfig {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MeshNews {
     /// A robot said something new of itself.
-    Report(RobotId),
+    Report(RobotId, Spoken),
     /// The fleet table has a greater version of this fact.
     Record(FleetKey),
     /// A robot is heard for the first time, or again after it was gone.

@@ -27,14 +27,18 @@ impl Mesh {
 
     /// Packs sections into as few datagrams as hold them, numbered when the receiver is known.
     pub(super) fn send(&mut self, to: SocketAddr, sections: Vec<Section>) -> usize {
-        let mut all = Vec::with_capacity(sections.len() + 1);
-        if let Some(seat) = self.peers.seat_at(to) {
-            all.push(Section::Link(self.links.mark(seat, self.clock)));
-        }
-        all.extend(sections);
+        let encoded: Vec<(u8, Vec<u8>)> = sections.iter().map(Section::encode).collect();
+        self.send_encoded(to, &encoded)
+    }
+
+    /// The same of sections by their tags and bodies: what goes to several is written once.
+    pub(super) fn send_encoded(&mut self, to: SocketAddr, sections: &[(u8, Vec<u8>)]) -> usize {
+        let mark = self.peers.seat_at(to).map(|seat| self.links.mark(seat, self.clock));
+        let mark = mark.map(|mark| Section::Link(mark).encode());
         let mut sent = 0;
         let header = self.header();
-        for bytes in header.pack(&all).into_iter().take(ANSWERS_MAX) {
+        let packed = header.pack_encoded(mark.iter().chain(sections));
+        for bytes in packed.into_iter().take(ANSWERS_MAX) {
             if self.outbox.len() >= OUTBOX_MAX {
                 self.traffic.dropped += 1;
                 continue;

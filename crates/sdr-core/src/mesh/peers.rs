@@ -27,6 +27,7 @@ pub(super) struct Peers {
     /// Seats whose turn has not come in this shuffle.
     turn: Vec<Seat>,
     stride: usize,
+    edition: u64,
 }
 
 impl Peers {
@@ -38,6 +39,7 @@ impl Peers {
             strays: BTreeMap::new(),
             turn: Vec::new(),
             stride: 0,
+            edition: 0,
         };
         known.for_each(|address| peers.learn(address));
         peers
@@ -48,6 +50,7 @@ impl Peers {
         if self.address(seat) == Some(address) && self.seats.get(&address) == Some(&seat) {
             return;
         }
+        self.edition += 1;
         if self.heard.len() <= seat.index() {
             self.heard.resize(seat.index() + 1, None);
         }
@@ -124,15 +127,9 @@ impl Peers {
         self.address(seat).map(|_| seat)
     }
 
-    /// At most `count` of `seats` with an address, by chance.
-    pub(super) fn pick(&self, seats: &[Seat], count: usize, rng: &mut Rng) -> Vec<SocketAddr> {
-        let mut left: Vec<SocketAddr> =
-            seats.iter().filter_map(|seat| self.address(*seat)).collect();
-        let mut picked = Vec::new();
-        while picked.len() < count && !left.is_empty() {
-            picked.push(left.swap_remove(rng.below(left.len())));
-        }
-        picked
+    /// Grows when a robot is heard from another address than before.
+    pub(super) fn edition(&self) -> u64 {
+        self.edition
     }
 
     /// A stray address that was never tried, or else, if `again`, the one tried longest ago.

@@ -38,7 +38,13 @@ impl Mesh {
 
     pub(super) fn take_in(&mut self, from: SocketAddr, datagram: Datagram) {
         let header = datagram.header;
-        let seat = match self.admit(&header.from, header.incarnation) {
+        let known = self.peers.seat_at(from).filter(|seat| {
+            let author = self.authors.at(*seat);
+            author.incarnation == header.incarnation && author.robot == header.from
+        });
+        let admission = known.map(Admission::Known);
+        let admission = admission.unwrap_or_else(|| self.admit(&header.from, header.incarnation));
+        let seat = match admission {
             Admission::Outdated(seat) => {
                 self.counters.stale += 1;
                 return self.correct(from, seat);
@@ -68,7 +74,7 @@ impl Mesh {
         }
         if is_new && self.liveness.is_living(seat) {
             answer.extend(self.greeting(seat));
-            let peers = self.peers.pick(&self.living_seats(), ADDRESSES_TOLD, &mut self.rng);
+            let peers = self.pick(ADDRESSES_TOLD, &[]);
             answer.push(Section::Peers(peers));
         }
         if !answer.is_empty() {
@@ -96,7 +102,7 @@ impl Mesh {
             Section::Stamps(stamps) => stamps.into_iter().for_each(|stamp| self.take_stamp(stamp)),
             Section::AskStamps(ask) => self.answer_stamps(&ask, answer),
             Section::AskRecords(asks) => self.answer_records(&asks, answer),
-            Section::AuthorDelta(delta) => self.learn(&delta),
+            Section::AuthorDelta(delta) => self.learn(delta),
             Section::AskNews(ask) => self.answer_inquiry(&ask, answer),
             Section::News(news) => self.take_news(seat, news),
             Section::Roster(piece) => self.answer_roster(&piece, answer),
@@ -127,7 +133,7 @@ impl Mesh {
         }
         if silence.is_some() {
             // others may be close to their patience with this robot
-            let peers = self.peers.pick(&self.living_seats(), RETURN_PEERS, &mut self.rng);
+            let peers = self.pick(RETURN_PEERS, &[]);
             for peer in peers {
                 self.send(peer, Vec::new());
             }

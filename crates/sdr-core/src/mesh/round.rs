@@ -13,11 +13,7 @@ use super::{
     author_table::{Lookup, Seat},
     wire::{beat_len, cut},
 };
-use crate::{
-    id::RobotId,
-    record::{FleetValue, RecordKind},
-    time::Instant,
-};
+use crate::{id::RobotId, time::Instant};
 
 /// Fleets with fewer others greet two of them each round.
 const SMALL_FLEET: usize = 8;
@@ -160,7 +156,7 @@ impl Mesh {
         self.greet_stray(living.is_empty());
         self.ping_quiet();
         if self.liveness.silence(self.clock) > LONELY_AFTER {
-            for peer in self.peers.pick(&living, LONELY_PEERS, &mut self.rng) {
+            for peer in self.pick(LONELY_PEERS, &[]) {
                 self.send(peer, vec![Section::Ping]);
             }
         }
@@ -300,10 +296,7 @@ impl Mesh {
 
     /// Robots whose news matters most here: whom this robot guards, and the coordinator.
     pub(super) fn preferred(&self) -> BTreeSet<Seat> {
-        let holder = match self.fleet.get(RecordKind::ROLE, "") {
-            Some((_, FleetValue::Role(role))) => self.authors.seat(&role.holder),
-            Some(_) | None => None,
-        };
+        let holder = self.fleet.role().and_then(|role| self.authors.seat(&role.holder));
         let guarded = self.guard.robots().filter_map(|robot| self.authors.seat(robot));
         guarded.chain(holder).collect()
     }

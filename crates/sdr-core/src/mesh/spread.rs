@@ -1,15 +1,12 @@
 //! News at once: own reports and shared facts go out when they change, with repeats.
 
-use alloc::{
-    collections::{BTreeMap, BTreeSet},
-    vec,
-    vec::Vec,
-};
+use alloc::{collections::BTreeMap, vec, vec::Vec};
 use core::{net::SocketAddr, time::Duration};
 
 use super::{
-    AuthorDelta, FleetRecord, Merge, Mesh, MeshNews, Section, author_table::Seat,
-    wire::SECTION_BYTES_MAX,
+    AuthorDelta, FleetRecord, Merge, Mesh, MeshNews, Section,
+    author_table::Seat,
+    wire::{SECTION_BYTES_MAX, TAG_FLEET_NEWS, body_of},
 };
 use crate::{
     id::RobotId,
@@ -125,7 +122,7 @@ impl Mesh {
 
     /// Own records made since the last push, to many at once.
     pub(super) fn push_own(&mut self) {
-        let mut peers = self.peers.pick(&self.living_seats(), PUSH_PEERS, &mut self.rng);
+        let mut peers = self.pick(PUSH_PEERS, &[]);
         // whoever decides hears it first
         let deciding: Vec<SocketAddr> =
             self.preferred().into_iter().filter_map(|seat| self.peers.address(seat)).collect();
@@ -137,8 +134,9 @@ impl Mesh {
             let own = self.authors.at(Seat::OWN);
             let Some(delta) = own.delta(self.spread.pushed, SECTION_BYTES_MAX) else { break };
             self.spread.pushed = delta.sequence;
+            let section = [Section::AuthorDelta(delta).encode()];
             for peer in &peers {
-                self.send(*peer, vec![Section::AuthorDelta(delta.clone())]);
+                self.send_encoded(*peer, &section);
             }
         }
     }
@@ -162,19 +160,19 @@ impl Mesh {
         deltas
     }
 
-    pub(super) fn learn(&mut self, delta: &AuthorDelta) {
+    pub(super) fn learn(&mut self, delta: AuthorDelta) {
         if delta.robot == self.config.robot {
             return;
         }
         let admission = self.admit(&delta.robot, delta.incarnation);
         let Some(seat) = admission.seat() else { return };
-        let author = self.authors.at_mut(seat);
-        let before = author.sequence();
+        let before = self.authors.at(seat).sequence();
         if before > 0 && planted::is(Defect::StaleReports) {
             return;
         }
-        let learned = author.learn(delta);
-        let advanced = author.sequence() > before;
+        let robot = delta.robot.clone();
+        let learned = self.authors.learn(seat, delta);
+        let advanced = self.authors.at(seat).sequence() > before;
         self.counters.refused += learned.refused;
         if learned.gap {
             self.repair.want(seat, self.clock);
@@ -186,7 +184,7 @@ impl Mesh {
             }
         }
         if learned.records {
-            self.news.push_back(MeshNews::Report(delta.robot.clone()));
+            self.news.push_back(MeshNews::Report(robot, learned.spoken));
         }
     }
 
@@ -271,19 +269,15 @@ impl Mesh {
         while let Some(wave) = self.spread.next_wave(self.clock) {
             let targets = match wave.count {
                 0 => wave.to,
-                count => {
-                    let mut living = self.living_seats();
-                    let without: BTreeSet<Seat> =
-                        wave.to.iter().filter_map(|to| self.peers.seat_at(*to)).collect();
-                    living.retain(|seat| !without.contains(seat));
-                    self.peers.pick(&living, count, &mut self.rng)
-                }
+                count => self.pick(count, &wave.to),
             };
-            let records: Vec<FleetRecord> =
-                wave.keys.iter().filter_map(|key| self.fleet.record(key)).cloned().collect();
-            for section in sections_of(&records, Section::FleetNews) {
+            let records = wave.keys.iter().filter_map(|key| self.fleet.record(key));
+            let chunks = chunks_of(records);
+            let sections: Vec<(u8, Vec<u8>)> =
+                chunks.iter().map(|chunk| (TAG_FLEET_NEWS, body_of(chunk))).collect();
+            for section in sections.chunks(1) {
                 for target in &targets {
-                    self.send(*target, vec![section.clone()]);
+                    self.send_encoded(*target, section);
                 }
             }
         }
@@ -306,20 +300,26 @@ pub(super) fn sections_of(
     records: &[FleetRecord],
     section: fn(Vec<FleetRecord>) -> Section,
 ) -> Vec<Section> {
-    let mut chunks: Vec<Vec<FleetRecord>> = Vec::new();
+    let chunks = chunks_of(records.iter()).into_iter();
+    chunks.map(|chunk| section(chunk.into_iter().cloned().collect())).collect()
+}
+
+/// Records in lots that fit one datagram each.
+fn chunks_of<'a>(records: impl Iterator<Item = &'a FleetRecord>) -> Vec<Vec<&'a FleetRecord>> {
+    let mut chunks: Vec<Vec<&FleetRecord>> = Vec::new();
     let mut used = usize::MAX;
     for record in records {
         let size = record.wire_len();
         used = used.saturating_add(size);
         match chunks.last_mut() {
-            Some(chunk) if used <= SECTION_BYTES_MAX => chunk.push(record.clone()),
+            Some(chunk) if used <= SECTION_BYTES_MAX => chunk.push(record),
             Some(_) | None => {
-                chunks.push(vec![record.clone()]);
+                chunks.push(vec![record]);
                 used = size + 2;
             }
         }
     }
-    chunks.into_iter().map(section).collect()
+    chunks
 }
 
 fn delta_len(delta: &AuthorDelta) -> usize {

@@ -67,7 +67,12 @@ pub(super) fn checked(
         let made = component(name, table, &defaults, reader);
         let Some((mut component, place)) = made else { continue };
         component.index = u16::try_from(components.len()).unwrap_or(u16::MAX);
-        check_size(&FleetValue::Component(component.clone()), place.run, "component", reader);
+        check_size(
+            &FleetValue::Component(component.clone().into()),
+            place.run,
+            "component",
+            reader,
+        );
         components.push(component);
         places.components.push(place);
     }

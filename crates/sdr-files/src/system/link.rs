@@ -43,7 +43,7 @@ pub fn link_profiles(
             continue;
         }
         connection.message_type.clone_from(&from.message_type);
-        let size = FleetValue::Connection(connection.clone()).encode().len();
+        let size = FleetValue::Connection(connection.clone().into()).encode().len();
         if size > RECORD_BYTES_MAX {
             let message = format!("the connection takes {size} bytes on the mesh");
             let help = format!("allowed: at most {RECORD_BYTES_MAX}");

@@ -34,8 +34,18 @@ pub(super) fn policies(
     }
     let allocation = allocation.map(|policy| policy.encode()).unwrap_or_default();
     let recovery = recovery.map(|policy| policy.encode()).unwrap_or_default();
-    check_size(&FleetValue::Allocation(allocation.clone()), mark, "allocation policy", reader);
-    check_size(&FleetValue::Recovery(recovery.clone()), recovery_mark, "recovery policy", reader);
+    check_size(
+        &FleetValue::Allocation(allocation.clone().into()),
+        mark,
+        "allocation policy",
+        reader,
+    );
+    check_size(
+        &FleetValue::Recovery(recovery.clone().into()),
+        recovery_mark,
+        "recovery policy",
+        reader,
+    );
     (allocation, recovery)
 }
 

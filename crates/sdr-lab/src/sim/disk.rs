@@ -2,23 +2,33 @@
 
 use std::time::Duration;
 
-use sdr_core::{effect::StoredState, input::StoreTicket};
+use sdr_core::{
+    effect::{StoredChange, StoredState},
+    input::StoreTicket,
+};
 
 /// Time a write takes on a healthy disk.
 pub(crate) const STORE_TIME: Duration = Duration::from_millis(3);
 
-/// An order to store.
+/// An order to store: what changed up to a ticket.
 #[derive(Debug)]
 pub(crate) struct Order {
-    pub(crate) ticket: StoreTicket,
-    pub(crate) state: StoredState,
+    ticket: StoreTicket,
+    changes: Vec<StoredChange>,
 }
 
-/// One order is written at a time; of those that wait only the newest counts, as each holds
-/// all before it.
+impl Order {
+    pub(crate) fn new(ticket: StoreTicket, change: StoredChange) -> Self {
+        Self { ticket, changes: vec![change] }
+    }
+}
+
+/// One order is written at a time; those that wait are written together.
 #[derive(Debug)]
 pub(crate) struct Disk {
     held: Option<StoredState>,
+    /// Changes that did not get there: the next write brings them too.
+    failed: Vec<StoredChange>,
     writing: Option<Order>,
     waiting: Option<Order>,
     /// Whether the robot will ever read it; a state that nobody reads is not kept.
@@ -31,6 +41,7 @@ impl Disk {
     pub(crate) fn new() -> Self {
         Self {
             held: None,
+            failed: Vec::new(),
             writing: None,
             waiting: None,
             is_read: true,
@@ -41,32 +52,47 @@ impl Disk {
 
     /// Takes an order; true when its write begins now.
     pub(crate) fn order(&mut self, order: Order) -> bool {
-        if self.writing.is_some() {
-            self.waiting = Some(order);
-            return false;
+        if self.writing.is_none() {
+            self.writing = Some(order);
+            return true;
         }
-        self.writing = Some(order);
-        true
+        match &mut self.waiting {
+            Some(waiting) => {
+                waiting.ticket = order.ticket;
+                waiting.changes.extend(order.changes);
+            }
+            None => self.waiting = Some(order),
+        }
+        false
     }
 
     /// The write under way is over; true when the next one begins.
     pub(crate) fn finish(&mut self) -> (Option<StoreTicket>, bool) {
         let Some(order) = self.writing.take() else { return (None, false) };
         let ticket = order.ticket;
-        if !self.full && self.is_read {
-            self.held = Some(order.state);
-        }
+        self.write(order, !self.full);
         self.writing = self.waiting.take();
         (Some(ticket), self.writing.is_some())
+    }
+
+    fn write(&mut self, order: Order, succeeds: bool) {
+        if !self.is_read {
+            return;
+        }
+        self.failed.extend(order.changes);
+        if succeeds {
+            let held = self.held.get_or_insert_default();
+            self.failed.drain(..).for_each(|change| held.take(change));
+        }
     }
 
     /// Power is lost; what was being written is there or not.
     pub(crate) fn crash(&mut self, written: Written) {
         self.waiting = None;
-        let under_way = self.writing.take();
-        if written == Written::Whole && !self.full && under_way.is_some() {
-            self.held = under_way.map(|order| order.state);
+        if let Some(order) = self.writing.take() {
+            self.write(order, written == Written::Whole && !self.full);
         }
+        self.failed.clear();
     }
 
     pub(crate) fn wipe(&mut self) {
@@ -90,7 +116,7 @@ mod tests {
     use super::*;
 
     fn order(ticket: StoreTicket) -> Order {
-        Order { ticket, state: StoredState { incarnation: ticket, ..StoredState::default() } }
+        Order::new(ticket, StoredChange { incarnation: ticket, ..StoredChange::default() })
     }
 
     fn held(disk: &Disk) -> Option<u64> {

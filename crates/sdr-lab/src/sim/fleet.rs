@@ -1,10 +1,10 @@
 //! The fleet in virtual time: robots, radio, and what is due.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use sdr_core::{
     api::DeployAnswer,
-    brain::BrainConfig,
+    brain::{Brain, BrainConfig},
     event::Event,
     id::{ComponentKey, RobotId},
     input::{Input, InstanceId},
@@ -17,6 +17,7 @@ use super::{
     chance::Chance,
     disk::Written,
     due::Due,
+    pool::Pool,
     process::Process,
     queue::Queue,
     robot::{Robot, body},
@@ -42,6 +43,12 @@ pub struct ActiveProcess {
     pub instance: InstanceId,
     /// Under which token.
     pub token: Token,
+}
+
+/// Hands inputs to brains in place of the fleet, to measure what they take.
+pub trait Probe {
+    /// Calls `brain.handle(now, input)`, once.
+    fn handle(&mut self, brain: &mut Brain, now: Instant, input: Input);
 }
 
 /// A fleet: `robot-1`, `robot-2`, ... in virtual time, on one thread.
@@ -75,6 +82,9 @@ pub struct Fleet {
     pub answers: Vec<(usize, Result<DeployAnswer, String>)>,
     /// Faults that struck, in words, when they are kept.
     pub struck: Vec<(Instant, String)>,
+    probe: Option<Box<dyn Probe>>,
+    /// What all brains hold in common, once.
+    pool: Arc<Pool>,
     gone_after: Duration,
     steps: u64,
 }
@@ -116,6 +126,8 @@ impl Fleet {
             told: Vec::new(),
             answers: Vec::new(),
             struck: Vec::new(),
+            probe: None,
+            pool: Arc::new(Pool::default()),
             steps: 0,
             setup,
         }
@@ -204,6 +216,11 @@ impl Fleet {
         }
     }
 
+    /// Lets `probe` hand inputs over from now on.
+    pub fn probe(&mut self, probe: Box<dyn Probe>) {
+        self.probe = Some(probe);
+    }
+
     /// Whether what a robot stores is kept for its next start.
     pub fn keep_disk(&mut self, robot: usize, keep: bool) {
         self.robots[robot].disk.is_read = keep;
@@ -218,7 +235,7 @@ impl Fleet {
     pub fn switch_on(&mut self, robot: usize) {
         // Monotonic clocks begin anew with their machine, anywhere.
         let shown = Instant::from_millis(1000 + self.chance.bits() % 1_000_000_000);
-        self.robots[robot].start(self.now, shown, self.setup.robots);
+        self.robots[robot].start(self.now, shown, self.setup.robots, &self.pool);
         let disk_kept = self.robots[robot].disk.held().is_some();
         self.disturb(self.now);
         self.sights.push(Sight::On { robot, disk_kept });
@@ -252,7 +269,11 @@ impl Fleet {
             let due = Due::Input { robot: number, life: robot.life, input };
             return self.queue.push(robot.paused_until, due);
         }
-        brain.handle(robot.clock.show(self.now), input);
+        let shown = robot.clock.show(self.now);
+        match &mut self.probe {
+            Some(probe) => probe.handle(brain, shown, input),
+            None => brain.handle(shown, input),
+        }
         self.tally.handled += 1;
         self.carry_out(number);
         self.set_wake(number);

@@ -9,7 +9,7 @@ use sdr_core::{
     time::{Duration, Instant},
 };
 
-use super::{Fleet, Record, Sight, check::convergence, table_hash};
+use super::{Fleet, Record, Sight, check::convergence, same_table};
 
 /// A robot that was killed on purpose.
 #[derive(Debug)]
@@ -136,7 +136,7 @@ impl Measure {
             return;
         };
         let Some(table) = fleet.table(holder).filter(|_| holder != join.robot) else { return };
-        if table.root() == own.root() && table_hash(table) == table_hash(own) {
+        if table.root() == own.root() && same_table(table, own) {
             let bytes = bytes_of(fleet, join.robot) - join.bytes_before;
             self.record.join_bytes.push(bytes as f64);
             self.join = None;

@@ -1,67 +1,51 @@
 //! What is due: one heap, ordered by time, then by the order in which it was put in.
 
-use std::{
-    cmp::{Ordering, Reverse},
-    collections::BinaryHeap,
-};
+use std::{cmp::Reverse, collections::BinaryHeap};
 
 use sdr_core::time::Instant;
 
-/// Something due at a moment; equal moments keep the order of [`Queue::push`].
-#[derive(Debug)]
-struct Entry<T> {
-    at: Instant,
-    sequence: u64,
-    due: T,
-}
-
-/// A heap of things due in virtual time.
+/// A heap of things due in virtual time; equal moments keep the order of [`Queue::push`].
 #[derive(Debug)]
 pub(crate) struct Queue<T> {
-    heap: BinaryHeap<Reverse<Entry<T>>>,
+    /// Moment, sequence, place: small, since a heap moves its entries about.
+    heap: BinaryHeap<Reverse<(Instant, u64, usize)>>,
+    places: Vec<Option<T>>,
+    free: Vec<usize>,
     sequence: u64,
 }
 
 impl<T> Queue<T> {
     pub(crate) fn new() -> Self {
-        Self { heap: BinaryHeap::new(), sequence: 0 }
+        Self { heap: BinaryHeap::new(), places: Vec::new(), free: Vec::new(), sequence: 0 }
     }
 
     pub(crate) fn push(&mut self, at: Instant, due: T) {
         self.sequence += 1;
-        self.heap.push(Reverse(Entry { at, sequence: self.sequence, due }));
+        let place = match self.free.pop() {
+            Some(place) => {
+                self.places[place] = Some(due);
+                place
+            }
+            None => {
+                self.places.push(Some(due));
+                self.places.len() - 1
+            }
+        };
+        self.heap.push(Reverse((at, self.sequence, place)));
     }
 
     /// The next thing, when it is due at `end` or before.
     pub(crate) fn pop_until(&mut self, end: Instant) -> Option<(Instant, T)> {
-        if self.heap.peek().is_none_or(|Reverse(entry)| entry.at > end) {
+        if self.heap.peek().is_none_or(|Reverse((at, ..))| *at > end) {
             return None;
         }
-        self.heap.pop().map(|Reverse(entry)| (entry.at, entry.due))
+        let Reverse((at, _, place)) = self.heap.pop()?;
+        self.free.push(place);
+        self.places[place].take().map(|due| (at, due))
     }
 
     pub(crate) fn len(&self) -> usize {
         self.heap.len()
-    }
-}
-
-impl<T> PartialEq for Entry<T> {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl<T> Eq for Entry<T> {}
-
-impl<T> PartialOrd for Entry<T> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl<T> Ord for Entry<T> {
-    fn cmp(&self, other: &Self) -> Ordering {
-        (self.at, self.sequence).cmp(&(other.at, other.sequence))
     }
 }
 

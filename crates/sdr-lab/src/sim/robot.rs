@@ -1,6 +1,6 @@
 //! One robot: a brain, its clock, its disk, its processes.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use sdr_core::{
     api::StatusView,
@@ -9,8 +9,8 @@ use sdr_core::{
     id::RobotId,
     input::InstanceId,
     lifecycle::LifecycleState,
+    mesh::Commons,
     order::Token,
-    record::{FleetValue, RecordKind},
     report::{HostReport, RobotFacts, RolePreference, Usage},
     time::Instant,
     units::{Bytes, Permille},
@@ -20,6 +20,7 @@ use super::{
     air::{FRAME_BYTES, address},
     clock::Clock,
     disk::Disk,
+    pool::Pool,
     process::{Behaviour, Process},
 };
 
@@ -100,7 +101,13 @@ impl Robot {
     }
 
     /// Starts the agent from what is on its disk, its clock showing `shown`.
-    pub(crate) fn start(&mut self, now: Instant, shown: Instant, robots: usize) {
+    pub(crate) fn start(
+        &mut self,
+        now: Instant,
+        shown: Instant,
+        robots: usize,
+        commons: &Arc<Pool>,
+    ) {
         self.life += 1;
         self.on_since = now;
         self.clock = Clock::new(now, shown, self.drift_ppm);
@@ -113,9 +120,11 @@ impl Robot {
             seed: (self.life << 40) ^ (self.number as u64) << 33,
             ..BrainConfig::new(self.id.clone(), self.facts.clone())
         };
+        let commons: Arc<dyn Commons> = commons.clone();
         let seams = Seams {
             recovery: Box::new(sdr_recovery::make),
             allocation: Box::new(sdr_alloc::check),
+            commons: Some(commons),
         };
         self.brain = Some(Brain::new(config, seams, self.disk.held().cloned(), shown));
     }
@@ -148,10 +157,8 @@ impl Robot {
 
     /// Whom it believes to hold the coordinator role, and under which term.
     pub fn coordinator(&self) -> Option<(&RobotId, u64)> {
-        match self.brain.as_ref()?.mesh().fleet().get(RecordKind::ROLE, "")? {
-            (_, FleetValue::Role(role)) => Some((&role.holder, role.term)),
-            (_, _) => None,
-        }
+        let role = self.brain.as_ref()?.mesh().fleet().role()?;
+        Some((&role.holder, role.term))
     }
 
     /// Whether it believes that it is the coordinator itself.

@@ -35,7 +35,7 @@ impl Fleet {
             effects += 1;
             match effect {
                 Effect::Send { to, bytes } => self.send(number, number_of(to), bytes),
-                Effect::Store { ticket, state } => self.store(number, Order { ticket, state }),
+                Effect::Store { ticket, change } => self.store(number, Order::new(ticket, change)),
                 Effect::Launch(order) => self.launch(number, *order),
                 Effect::Command { instance, command } => self.command(number, instance, command),
                 Effect::Routes(routes) => self.route(number, &routes),

@@ -1,11 +1,10 @@
 //! What is so, whatever the robots believe: who can hear whom, who runs what.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use sdr_core::{
     id::ComponentKey,
-    mesh::FleetTable,
-    order::hash64,
+    mesh::{Fact, FleetTable},
     record::{FleetValue, RecordKind},
     spec::{ComponentSpec, IsolationAction},
     time::Instant,
@@ -123,14 +122,10 @@ impl Fleet {
             if !system.wanted {
                 continue;
             }
-            let parts = table.of_kind(RecordKind::COMPONENT);
-            for (key, part, value) in parts {
-                let (FleetValue::Component(spec), Some((of, _))) =
-                    (value, key.name.split_once('/'))
-                else {
-                    continue;
-                };
-                if of == system.name.as_str() && *part == version {
+            let prefix = format!("{}/", system.name);
+            for (_, part, value) in table.below(RecordKind::COMPONENT, &prefix) {
+                let FleetValue::Component(spec) = value else { continue };
+                if *part == version {
                     wanted.push(ComponentKey::new(&system.name, &spec.name));
                 }
             }
@@ -165,7 +160,7 @@ impl Fleet {
             let FleetValue::Component(spec) = value else { return None };
             Some((version, spec))
         });
-        specs.max_by_key(|(version, _)| *version).map(|(_, spec)| spec)
+        specs.max_by_key(|(version, _)| *version).map(|(_, spec)| &**spec)
     }
 
     /// How many components were ever seen.
@@ -198,26 +193,8 @@ const MEMORY_LEFT: Bytes = Bytes::mega(200);
 /// Robots whose tables are looked at for what is wanted.
 const SPEAKERS: usize = 12;
 
-/// Kinds of records that exist or may come.
-const KINDS: std::ops::RangeInclusive<u8> = 0..=31;
-
-/// Hash over a whole table: equal tables have equal ones.
-pub fn table_hash(table: &FleetTable) -> u64 {
-    let mut hash = 0_u64;
-    for kind in KINDS {
-        for (key, _, _) in table.of_kind(RecordKind(kind)) {
-            let Some(record) = table.record(key) else { continue };
-            let version = &record.version;
-            let epoch =
-                version.epoch.as_ref().map_or((0, ""), |e| (e.number, e.minted_by.as_str()));
-            let text = format!(
-                "{kind} {} {epoch:?} {} {} {}",
-                key.name, version.revision, version.term, version.author
-            );
-            hash = hash.rotate_left(7)
-                ^ hash64(text.as_bytes())
-                ^ hash64(&record.value).rotate_left(31);
-        }
-    }
-    hash
+/// Whether two tables hold the same, whatever their own hashes say.
+pub fn same_table(one: &FleetTable, other: &FleetTable) -> bool {
+    let same = |(one, other): (&Arc<Fact>, &Arc<Fact>)| Arc::ptr_eq(one, other) || one == other;
+    one.len() == other.len() && one.facts().iter().zip(other.facts().iter()).all(same)
 }

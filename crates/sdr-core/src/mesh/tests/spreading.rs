@@ -7,6 +7,7 @@ use super::{super::*, Bench, host, mesh, robot, role};
 use crate::{
     order::Version,
     record::{FleetKey, RecordKind},
+    report::LinkReport,
     units::Bytes,
 };
 
@@ -155,7 +156,7 @@ fn system(revision: u64, wanted: bool, author: usize) -> FleetRecord {
 }
 
 fn policy_part(revision: u64, name: &str, kind: RecordKind, author: usize) -> FleetRecord {
-    let value = crate::record::FleetValue::Recovery(crate::spec::PolicyBytes::default());
+    let value = crate::record::FleetValue::Recovery(alloc::sync::Arc::default());
     let version = Version { epoch: None, revision, term: 0, author: robot(author) };
     FleetRecord::new(kind, name.into(), version, &value)
 }

@@ -199,9 +199,9 @@ proptest! {
         records.into_iter().for_each(|record| { one.merge(record); });
         shuffled.into_iter().for_each(|record| { other.merge(record); });
 
-        prop_assert_eq!(one.to_stored(), other.to_stored());
+        prop_assert_eq!(one.facts(), other.facts());
         prop_assert_eq!(one.tree().root(), other.tree().root());
-        let again = FleetTable::from_stored(one.to_stored());
+        let again = FleetTable::new(one.facts(), None);
         prop_assert_eq!(again.tree().root(), one.tree().root());
     }
 }

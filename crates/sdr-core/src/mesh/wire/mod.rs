@@ -15,6 +15,7 @@
 //! at all are answered with a value or an error, never a panic.
 
 mod beat;
+mod record;
 mod section;
 
 use alloc::vec::Vec;
@@ -23,6 +24,8 @@ use thiserror::Error;
 
 pub use beat::{Beat, PlacedBeat, Sign};
 pub(super) use beat::{beat_len, cut, last_of};
+pub(super) use record::{RecordRef, body_of};
+pub(super) use section::TAG_FLEET_NEWS;
 pub use section::{
     AskNews, AskStamps, AuthorDelta, Beats, Echo, FleetEntries, FleetNodes, LinkMark, News, Pulse,
     RosterPiece, SECTION_NAMES, Section, Stamp, Summary,
@@ -127,21 +130,30 @@ impl Header {
     /// Packs `sections`, in order, into as few datagrams as hold them; one that fits no
     /// datagram is left out.
     pub fn pack(&self, sections: &[Section]) -> Vec<Vec<u8>> {
-        let header = self.encode();
+        let encoded: Vec<(u8, Vec<u8>)> = sections.iter().map(Section::encode).collect();
+        self.pack_encoded(encoded.iter())
+    }
+
+    /// The same of sections by their tags and bodies.
+    pub(super) fn pack_encoded<'a>(
+        &self,
+        sections: impl Iterator<Item = &'a (u8, Vec<u8>)>,
+    ) -> Vec<Vec<u8>> {
+        let mut bytes = self.encode();
+        let header_len = bytes.len();
         let mut packed = Vec::new();
-        let mut bytes = header.clone();
-        for section in sections {
-            let (tag, body) = section.encode();
+        for (tag, body) in sections {
             let size = body.len() + 3;
-            if header.len() + size > DATAGRAM_BYTES_MAX {
+            if header_len + size > DATAGRAM_BYTES_MAX {
                 continue;
             }
             if bytes.len() + size > DATAGRAM_BYTES_MAX {
-                packed.push(core::mem::replace(&mut bytes, header.clone()));
+                let next = bytes[..header_len].to_vec();
+                packed.push(core::mem::replace(&mut bytes, next));
             }
-            bytes.push(tag);
+            bytes.push(*tag);
             put_varint(body.len() as u64, &mut bytes);
-            bytes.extend_from_slice(&body);
+            bytes.extend_from_slice(body);
         }
         packed.push(bytes);
         packed
@@ -151,6 +163,15 @@ impl Header {
 impl Datagram {
     /// Reads a datagram of `fleet`.
     pub fn decode(bytes: &[u8], fleet: u32) -> Result<Self, WireError> {
+        Self::decode_news(bytes, fleet, &|_| false)
+    }
+
+    /// Reads a datagram of `fleet`, but for the records of facts that are `known`.
+    pub(super) fn decode_news(
+        bytes: &[u8],
+        fleet: u32,
+        known: &dyn Fn(&RecordRef<'_>) -> bool,
+    ) -> Result<Self, WireError> {
         if bytes.len() > DATAGRAM_BYTES_MAX {
             return Err(WireError::TooLong(bytes.len()));
         }
@@ -175,7 +196,7 @@ impl Datagram {
             let tag = reader.byte()?;
             let length = usize::try_from(reader.varint()?).unwrap_or(usize::MAX);
             let body = reader.take(length)?;
-            sections.extend(Section::decode(tag, body)?);
+            sections.extend(Section::decode(tag, body, known)?);
         }
         Ok(Self { header: Header { fleet, from, incarnation, heartbeat, sequence }, sections })
     }

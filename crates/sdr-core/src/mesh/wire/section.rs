@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Reader, WireError,
     beat::{BEATS_MAX, Beat, PlacedBeat, decode_placed, encode_placed},
+    record::{RecordRef, unknown_of},
 };
 use crate::{
     id::RobotId,
@@ -213,7 +214,7 @@ const TAG_FLEET_ENTRIES: u8 = 14;
 const TAG_FLEET_WANTED: u8 = 15;
 const TAG_FLEET_RECORDS: u8 = 16;
 const TAG_PEERS: u8 = 17;
-const TAG_FLEET_NEWS: u8 = 18;
+pub(in crate::mesh) const TAG_FLEET_NEWS: u8 = 18;
 const TAG_PULSE: u8 = 19;
 
 /// What the sections are called, by tag; 0 stands for headers.
@@ -242,7 +243,7 @@ pub const SECTION_NAMES: [&str; 20] = [
 
 impl Section {
     /// The tag and the body.
-    pub(super) fn encode(&self) -> (u8, Vec<u8>) {
+    pub(in crate::mesh) fn encode(&self) -> (u8, Vec<u8>) {
         fn plain<T: Serialize>(value: &T) -> Vec<u8> {
             postcard::to_allocvec(value).expect("writing plain data to memory cannot fail")
         }
@@ -284,8 +285,12 @@ impl Section {
     }
 
     /// The section behind `tag`; `None` for a tag of a later version. Bytes behind the known
-    /// fields are a later version's and are skipped.
-    pub(super) fn decode(tag: u8, body: &[u8]) -> Result<Option<Self>, WireError> {
+    /// fields are a later version's and are skipped; so are records of facts that are `known`.
+    pub(super) fn decode(
+        tag: u8,
+        body: &[u8],
+        known: &dyn Fn(&RecordRef<'_>) -> bool,
+    ) -> Result<Option<Self>, WireError> {
         fn plain<'a, T: Deserialize<'a>>(tag: u8, body: &'a [u8]) -> Result<T, WireError> {
             let taken = postcard::take_from_bytes(body).map_err(|_| WireError::Body(tag));
             taken.map(|(value, _later_fields)| value)
@@ -318,8 +323,8 @@ impl Section {
             TAG_FLEET_NODES => Self::FleetNodes(plain(tag, body)?),
             TAG_FLEET_ENTRIES => Self::FleetEntries(plain(tag, body)?),
             TAG_FLEET_WANTED => Self::FleetWanted(plain(tag, body)?),
-            TAG_FLEET_RECORDS => Self::FleetRecords(plain(tag, body)?),
-            TAG_FLEET_NEWS => Self::FleetNews(plain(tag, body)?),
+            TAG_FLEET_RECORDS => Self::FleetRecords(unknown_of(tag, body, known)?),
+            TAG_FLEET_NEWS => Self::FleetNews(unknown_of(tag, body, known)?),
             TAG_PEERS => Self::Peers(plain(tag, body)?),
             _ => return Ok(None),
         };

@@ -1,6 +1,8 @@
 //! After the faults: each wanted component active exactly once, where its assignment says;
 //! one coordinator whom all know; equal tables; every connection carries the latest token.
 
+use std::collections::BTreeSet;
+
 use sdr_core::{
     brain::Brain,
     id::{ComponentKey, RobotId},
@@ -8,10 +10,9 @@ use sdr_core::{
     mesh::FleetTable,
     order::Token,
     record::{FleetValue, RecordKind},
-    report::Report,
 };
 
-use crate::sim::{Fleet, table_hash};
+use crate::sim::{Fleet, same_table};
 
 /// Records compared byte by byte; of larger fleets the first robots stand for all.
 const RECORDS_MAX: usize = 100_000;
@@ -59,9 +60,9 @@ fn equal_tables(fleet: &Fleet, on: &[usize]) -> Option<String> {
         return Some(format!("tables of robot-{} and robot-{} differ", on[0] + 1, other + 1));
     }
     let compared = on.len().min((RECORDS_MAX / first?.max(1)).max(2));
-    let hash = |robot: &usize| fleet.table(*robot).map(table_hash);
-    let first = hash(on.first()?);
-    let other = on[..compared].iter().find(|robot| hash(robot) != first)?;
+    let first = fleet.table(*on.first()?)?;
+    let same = |robot: &usize| fleet.table(*robot).is_some_and(|table| same_table(table, first));
+    let other = on[..compared].iter().find(|robot| !same(robot))?;
     Some(format!("tables of robot-{} and robot-{} differ", on[0] + 1, other + 1))
 }
 
@@ -97,6 +98,7 @@ fn each_once(fleet: &Fleet, on: &[usize]) -> Option<String> {
             return Some(format!("{key} is active on {place}, not at its home {home:?}"));
         }
     }
+    let wanted: BTreeSet<&ComponentKey> = wanted.iter().collect();
     let extra = (0..fleet.components()).find(|component| {
         !fleet.active_of(*component).is_empty() && !wanted.contains(fleet.key(*component))
     })?;
@@ -144,17 +146,8 @@ fn instances_of(
 ) -> Vec<(ComponentKey, LifecycleState, Option<Token>)> {
     let mesh = fleet.robots[robot].brain().map(Brain::mesh);
     let author = mesh.and_then(|mesh| mesh.authors().author(author));
-    let reports = author.into_iter().flat_map(|author| author.reports());
-    let instances = reports.filter_map(|report| match report {
-        Report::Instance(of) => Some((of.component.clone(), of.state, of.token.clone())),
-        Report::Facts(_)
-        | Report::Host(_)
-        | Report::Link(..)
-        | Report::Condition(_)
-        | Report::Homeless(_)
-        | Report::Succession(_) => None,
-    });
-    instances.collect()
+    let instances = author.into_iter().flat_map(|author| author.instances());
+    instances.map(|of| (of.component.clone(), of.state, of.token.clone())).collect()
 }
 
 fn all_heard(fleet: &Fleet) -> Option<String> {
