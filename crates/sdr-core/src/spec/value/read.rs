@@ -148,6 +148,8 @@ impl<'de> Visitor<'de> for Tagged {
 mod tests {
     use alloc::{format, vec};
 
+    use alloc::string::ToString;
+
     use super::*;
 
     fn nested(depth: usize) -> Value {
