@@ -51,9 +51,8 @@ const MOVED: [&str; 2] = ["fisheye", "anomaly"];
 /// Plays it.
 pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Failure> {
     let folder = Folder::new()?;
-    for program in system::executables(folder.path())? {
-        locate::component(&program)?;
-    }
+    let programs = system::executables(folder.path())?;
+    locate::all(programs.iter().map(String::as_str))?;
     let world = folder.path().join("w");
     let stage = Stage::start(&world)?;
     let bodies = stage.bodies(&world);
