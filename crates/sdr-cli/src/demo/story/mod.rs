@@ -266,6 +266,8 @@ impl Story<'_> {
             truth: self.stage.truth(),
             commands_ns: self.stage.commands_ns(),
             detector: self.plan.images.is_none().then(|| self.stage.detector(until_ns)),
+            pictures: self.plan.images.as_ref().map(|images| images.sentence()),
+            danger_topic: Some(format!("/{}/anomaly/danger", spec.name)),
         }
     }
 

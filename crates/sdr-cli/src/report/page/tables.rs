@@ -107,6 +107,10 @@ fn behaviour(report: &Report) -> Vec<[String; 4]> {
             what,
         ));
     }
+    if let Some((all, danger)) = figures.verdicts {
+        let what = format!("pictures taken for dangerous, of {all} that the detector looked at");
+        rows.push(row("danger seen", danger.to_string(), what));
+    }
     rows
 }
 
@@ -207,7 +211,10 @@ pub(super) fn connections(report: &Report) -> String {
                 counts.fenced.to_string(),
                 counts.late.to_string(),
                 or_dash(period.map(duration)),
-                or_dash(pause.map(|pause| duration(pause.gap_max_ns))),
+                or_dash(pause.map(|pause| {
+                    let over = pause.over_ns().map(|bar| format!(" (bar {})", duration(bar)));
+                    format!("{}{}", duration(pause.gap_max_ns), over.unwrap_or_default())
+                })),
             ]
         })
         .collect();
