@@ -95,7 +95,7 @@ fn behaviour(report: &Report) -> Vec<[String; 4]> {
     if let Some(detector) = &report.extra.detector {
         let after = detector.stop_after_ms.map(|ms| format!("{:.2} s", ms / 1e3));
         let what = format!(
-            "from its appearance until the robot stood, {} before it; shown {}, stops {}, stops without cause {}",
+            "from its appearance until the robot stood, {} before it; shown {}, stops {}, stops without cause {}; the path stays inside its area, so the stop at its edge is not shown",
             or_dash(detector.stop_distance_m.map(|m| format!("{m:.2} m"))),
             detector.shown,
             detector.stops,
