@@ -84,7 +84,7 @@ impl<O: Optics> Component for Eye<O> {
         let height =
             setup.parameter_within("height", height, sizes, "of those pictures, pixels")?;
         let place = if folder.is_empty() {
-            Place::Device(setup.device(O::NAME)?)
+            Place::Device(setup.device_unless(O::NAME, "images")?)
         } else {
             let (width, height) = (u32::try_from(width)?, u32::try_from(height)?);
             Place::Folder { folder: PathBuf::from(folder), width, height }

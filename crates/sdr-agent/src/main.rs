@@ -33,9 +33,10 @@ use std::error::Error;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::thread;
 
 use clap::Parser;
-use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+use rustix::process::{Resource, Rlimit, Signal, getpid, getrlimit, kill_process, setrlimit};
 use sdr_files::RobotConfig;
 use sdr_files::robot::{LogFormat, Places};
 use tokio::signal::unix::{SignalKind, signal};
@@ -61,6 +62,9 @@ struct Arguments {
     /// Check the file, say what is wrong with it, and end
     #[arg(long)]
     check: bool,
+    /// End when standard input is closed: whoever started this agent is gone then
+    #[arg(long)]
+    end_with_stdin: bool,
 }
 
 fn main() -> ExitCode {
@@ -79,6 +83,9 @@ fn main() -> ExitCode {
     }
     end_with_any_panic();
     raise_descriptors();
+    if arguments.end_with_stdin {
+        thread::spawn(end_with_stdin);
+    }
     match serve(&robot) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => fail(&chain(&*error), 1),
@@ -115,6 +122,19 @@ fn stop_signals() -> io::Result<watch::Receiver<bool>> {
         }
     });
     Ok(stopped)
+}
+
+/// Waits until nobody can write to standard input any more, then ends the agent as SIGTERM does.
+///
+/// The kernel closes a starter's end of the pipe however it dies, which its own clearing up
+/// cannot promise.
+fn end_with_stdin() {
+    // What is written means nothing; a broken stdin is a closed one.
+    let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
+    tracing::info!(event = "starter-gone", "standard input is closed");
+    if let Err(error) = kill_process(getpid(), Signal::TERM) {
+        tracing::error!(event = "not-ended", %error);
+    }
 }
 
 fn start_log(robot: &RobotConfig) -> Result<(), ParseError> {

@@ -1,6 +1,7 @@
 //! Finds the programs that are built together with `sdr`: they lie beside it.
 
 use std::{
+    collections::BTreeSet,
     env,
     path::{Path, PathBuf},
 };
@@ -21,21 +22,34 @@ pub(crate) fn agent() -> Result<PathBuf, Failure> {
     beside(&folder()?, "sdr-agent", "sdr-agent")
 }
 
-/// The component executable `name` beside `sdr`.
-pub(crate) fn component(name: &str) -> Result<PathBuf, Failure> {
-    beside(&folder()?, name, "sdr-components")
+/// Sees that the agent and these component executables are beside `sdr`; one failure names all
+/// that are not.
+pub(crate) fn all<'a>(components: impl IntoIterator<Item = &'a str>) -> Result<(), Failure> {
+    let components = components.into_iter().map(|name| (name, "sdr-components"));
+    let wanted: Vec<_> = std::iter::once(("sdr-agent", "sdr-agent")).chain(components).collect();
+    all_beside(&folder()?, &wanted)
 }
 
 /// `folder/name` when it can be run, else a failure that names the command which builds it.
 fn beside(folder: &Path, name: &str, package: &str) -> Result<PathBuf, Failure> {
-    let path = folder.join(name);
-    if is_program(&path) {
-        return Ok(path);
+    all_beside(folder, &[(name, package)]).map(|()| folder.join(name))
+}
+
+fn all_beside(folder: &Path, wanted: &[(&str, &str)]) -> Result<(), Failure> {
+    let missing: Vec<_> =
+        wanted.iter().filter(|(name, _)| !is_program(&folder.join(name))).collect();
+    if missing.is_empty() {
+        return Ok(());
     }
+    let names: Vec<&str> = missing.iter().map(|(name, _)| *name).collect();
+    let packages: BTreeSet<&str> = missing.iter().map(|(_, package)| *package).collect();
+    let packages: Vec<String> = packages.iter().map(|package| format!("-p {package}")).collect();
     let release = if folder.ends_with("debug") { "" } else { "--release " };
     Err(Failure::new(format!(
-        "no program {} (looked beside sdr)\n  Build it:   cargo build {release}-p {package}",
-        path.display()
+        "no program {} in {} (looked beside sdr)\n  Build:   cargo build {release}{}",
+        names.join(", "),
+        folder.display(),
+        packages.join(" ")
     )))
 }
 
@@ -63,6 +77,17 @@ mod tests {
         let text = sentence(failure);
         assert!(text.contains("cargo build --release -p sdr-components"), "{text}");
         assert!(text.contains("fisheye"), "{text}");
+    }
+
+    #[test]
+    fn all_that_is_missing_is_named_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let wanted = [("sdr-agent", "sdr-agent"), ("eye", "parts"), ("ear", "parts")];
+
+        let text = sentence(all_beside(folder.path(), &wanted).unwrap_err());
+
+        assert!(text.contains("sdr-agent, eye, ear"), "{text}");
+        assert!(text.ends_with("cargo build --release -p parts -p sdr-agent"), "{text}");
     }
 
     #[test]

@@ -16,6 +16,9 @@ pub(crate) fn nearest<'a>(
 
 /// `allowed: a, b, c (did you mean `b`?)`.
 pub(crate) fn allowed_words(word: &str, allowed: &[&str]) -> String {
+    if allowed.is_empty() {
+        return String::from("there is none");
+    }
     let list = allowed.join(", ");
     match nearest(word, allowed.iter().copied()) {
         Some(meant) => format!("allowed: {list} (did you mean `{meant}`?)"),

@@ -51,6 +51,8 @@ impl fmt::Display for Problem {
 
 /// Longest part of a line that is shown, in characters.
 const SHOWN_MAX: usize = 160;
+/// Stands where a line was cut.
+const CUT: &str = "...";
 
 impl Problem {
     /// The part of the line around the column, and the column's place in it, from 0.
@@ -60,8 +62,10 @@ impl Problem {
             return (self.snippet.clone(), column);
         }
         let start = column.saturating_sub(SHOWN_MAX / 2);
-        let part = self.snippet.chars().skip(start).take(SHOWN_MAX).collect();
-        (part, column - start)
+        let before = if start > 0 { CUT } else { "" };
+        let part: String = self.snippet.chars().skip(start).take(SHOWN_MAX).collect();
+        let after = if self.snippet.chars().nth(start + SHOWN_MAX).is_some() { CUT } else { "" };
+        (format!("{before}{part}{after}"), before.len() + column - start)
     }
 }
 

@@ -1,11 +1,12 @@
 //! Policies that cannot be read: refused from operators, replaced when others took them.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use sdr_core::{
     brain::{Brain, BrainConfig, Seams},
     effect::{Effect, StoredState},
     input::Input,
+    mesh::{Fact, Facts},
     record::{FleetValue, RecordKind},
     report::HostReport,
     spec::PolicyBytes,
@@ -60,15 +61,18 @@ fn remembered() -> StoredState {
     fleet.run(Duration::from_secs(3));
     fleet.deploy(0, &single(100));
     fleet.run(Duration::from_secs(3));
-    let mut records = fleet.table(0).unwrap().to_stored();
-    for record in &mut records {
-        record.value = match record.key.kind {
-            RecordKind::RECOVERY => FleetValue::Recovery(unreadable()).encode(),
-            RecordKind::ALLOCATION => FleetValue::Allocation(unreadable()).encode(),
-            _ => continue,
-        };
+    let mut facts = Facts::default();
+    for fact in fleet.table(0).unwrap().facts().iter() {
+        let mut record = fact.record().clone();
+        let policy = Arc::new(unreadable());
+        match record.key.kind {
+            RecordKind::RECOVERY => record.value = FleetValue::Recovery(policy).encode(),
+            RecordKind::ALLOCATION => record.value = FleetValue::Allocation(policy).encode(),
+            _ => {}
+        }
+        facts.put(Fact::read(record).unwrap());
     }
-    StoredState { incarnation: 1, fleet: records, ..StoredState::default() }
+    StoredState { incarnation: 1, fleet: facts, ..StoredState::default() }
 }
 
 #[test]

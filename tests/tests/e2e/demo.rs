@@ -68,7 +68,13 @@ fn the_demo_places_five_moves_two_and_reports() {
     for figure in ["activation_ms", "recovery_ms"] {
         assert!(report[figure].as_f64().is_some_and(|value| value > 0.0), "{figure}: {report:#}");
     }
-    assert_eq!(report["samples"].as_object().unwrap().len(), 5, "{report:#}");
+    let samples = report["samples"].as_object().unwrap();
+    assert_eq!(samples.len(), 5, "{report:#}");
+    for (connection, counts) in samples {
+        // The demo looks on for 4 s after the move: a stream that stopped is silent for most of it.
+        let silent = counts["silent_ms"].as_f64();
+        assert!(silent.is_some_and(|ms| ms < 2000.0), "{connection} stopped: {report:#}");
+    }
     assert_eq!(report["stream_gap_ms"].as_object().unwrap().len(), 5);
     assert_eq!(report["agents"].as_object().unwrap().len(), 3);
     assert!(report["controller_gap_ms"].is_object(), "{report:#}");

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path, process::Stdio, time::Duration};
 
+use rustix::process::{Pid, Signal, kill_process_group};
 use sdr_core::spec::{ComponentProfile, SystemSpec};
 use serde::Deserialize;
 use tokio::{io::AsyncReadExt, process::Command, time::timeout};
@@ -72,20 +73,36 @@ async fn describe(program: &Path) -> Result<ComponentProfile, String> {
         .map_err(|error| format!("{shown} --describe printed no component profile: {error}"))
 }
 
-/// What the program prints; it ends with us.
+/// A program and all it started; killed when it is dropped before the program ended.
+struct Group(Option<Pid>);
+
+impl Drop for Group {
+    fn drop(&mut self) {
+        if let Some(leader) = self.0 {
+            // It may have ended this very moment.
+            let _ = kill_process_group(leader, Signal::KILL);
+        }
+    }
+}
+
+/// What the program prints; it and all it started end with us.
 async fn output_of(program: &Path) -> std::io::Result<Vec<u8>> {
     let mut child = Command::new(program)
         .arg("--describe")
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
+        .process_group(0)
         .kill_on_drop(true)
         .spawn()?;
+    let leader = child.id().and_then(|pid| i32::try_from(pid).ok());
+    let mut group = Group(leader.and_then(Pid::from_raw));
     let mut text = Vec::new();
     if let Some(stdout) = child.stdout.take() {
         stdout.take(DESCRIPTION_BYTES_MAX).read_to_end(&mut text).await?;
     }
     let status = child.wait().await?;
+    group.0 = None;
     match status.success() {
         true => Ok(text),
         false => Err(std::io::Error::other(format!("it ended with {status}"))),

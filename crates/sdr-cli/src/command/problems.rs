@@ -30,7 +30,10 @@ impl ProblemReport {
             column: problem.column,
             width: problem.width,
             found: problem.message.clone(),
-            allowed: problem.help.clone(),
+            allowed: problem.help.as_deref().map(|help| {
+                // The field's name says it already.
+                help.strip_prefix("allowed: ").unwrap_or(help).to_owned()
+            }),
         }
     }
 }

@@ -42,6 +42,9 @@ pub(super) fn lines(report: &Report, page: &Path) -> Vec<String> {
             received + lost
         ),
     ];
+    if let (Some(_), Some((all, danger))) = (&report.extra.pictures, figures.verdicts) {
+        lines.push(format!(" {:<25}{all}, danger seen in {danger}", "pictures looked at"));
+    }
     lines.extend(CAVEAT.split_inclusive(": ").map(|part| format!(" {}", part.trim_end())));
     for note in &report.summary.notes {
         lines.extend(wrap(&format!(" note: {note}"), COLUMNS, "   "));

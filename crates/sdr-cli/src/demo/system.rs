@@ -138,6 +138,8 @@ mod tests {
             name: (*name).to_owned(),
             about: String::new(),
             default: Value::Text(String::new()),
+            min: None,
+            max: None,
         };
         ComponentProfile {
             name: name.to_owned(),
@@ -145,6 +147,7 @@ mod tests {
             inputs: inputs.iter().map(port).collect(),
             outputs: outputs.iter().map(port).collect(),
             parameters: parameters.iter().map(parameter).collect(),
+            devices: Vec::new(),
         }
     }
 

@@ -42,6 +42,10 @@ pub(crate) struct Extra {
     pub(crate) commands_ns: Vec<u64>,
     /// What became of the dangerous object.
     pub(crate) detector: Option<Detector>,
+    /// What the cameras showed instead of the world.
+    pub(crate) pictures: Option<String>,
+    /// The topic of the detector's verdicts.
+    pub(crate) danger_topic: Option<String>,
 }
 
 /// How the radio was played.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     extra::{Extra, TruthPoint},
     link::{Counts, Link, Pause},
+    page::duration,
     read::Fix,
     run::{Move, Run},
 };
@@ -48,6 +49,8 @@ pub(crate) struct Figures {
     pub(crate) not_activated: Vec<String>,
     /// When the hold time of the trouble was over, or a robot was taken for gone.
     pub(crate) trouble_ns: Option<u64>,
+    /// When the change began: the trouble, or that it was foreseen and a next home got ready.
+    pub(crate) change_ns: Option<u64>,
     /// The moves that followed from it.
     pub(crate) moves: Vec<Move>,
     /// From the trouble until the moved components are active and heard.
@@ -68,6 +71,8 @@ pub(crate) struct Figures {
     pub(crate) samples: BTreeMap<String, Traffic>,
     /// Mean and largest distance between estimate and truth, metres.
     pub(crate) position_error_m: Option<(f64, f64)>,
+    /// Verdicts of the detector, and those of danger among them.
+    pub(crate) verdicts: Option<(u64, u64)>,
 }
 
 impl Figures {
@@ -90,12 +95,22 @@ impl Figures {
         figures
     }
 
-    /// From when until when the streams are looked at: around the recovery, else nothing.
+    /// From when until when the streams are looked at: around the change, else nothing.
     pub(crate) fn window_ns(&self, run: &Run) -> Option<(u64, u64)> {
-        let from = self.trouble_ns?;
+        let trouble = self.trouble_ns?;
         let last = self.moves.iter().map(|one| one.active_ns).max()?;
-        let done = self.recovery_ns.map_or(last, |recovery| from + recovery);
+        let done = self.recovery_ns.map_or(last, |recovery| trouble + recovery);
+        let from = self.change_ns.unwrap_or(trouble);
         Some((from, done.saturating_add(AFTER_NS).min(run.until_ns)))
+    }
+
+    /// A sentence for each stream that paused for longer than it may.
+    pub(crate) fn too_long(&self) -> impl Iterator<Item = String> {
+        let pauses = self.pauses.iter().filter_map(|(name, pause)| Some((name, (*pause)?)));
+        pauses.filter_map(|(name, pause)| {
+            let (gap, bar) = (duration(pause.gap_max_ns), duration(pause.over_ns()?));
+            Some(format!("{name} paused for {gap} around the move; at most {bar} wanted"))
+        })
     }
 
     fn find_activation(&mut self, run: &Run, extra: &Extra) {
@@ -138,6 +153,7 @@ impl Figures {
         };
         let limit = trouble.saturating_add(CAUSE_WITHIN_NS);
         self.moves = moves.into_iter().filter(|one| one.active_ns <= limit).collect();
+        self.change_ns = Some(change_began(run, trouble, &self.moves));
         let mut done = trouble;
         for one in &self.moves {
             done = done.max(one.active_ns);
@@ -189,6 +205,17 @@ fn with<'a>(known: &'a [String], seen: impl IntoIterator<Item = &'a String>) -> 
 pub(crate) fn number(event: &sdr_core::recording::EventSample, name: &str) -> Option<f64> {
     let index = event.number_names.iter().position(|word| word == name)?;
     event.number_values.get(index).copied().filter(|value| value.is_finite())
+}
+
+/// When the next homes of these moves began to get ready, which may be before the trouble stood.
+fn change_began(run: &Run, trouble: u64, moves: &[Move]) -> u64 {
+    let about = |event: &&sdr_core::recording::EventSample| {
+        let name = run.name(&event.system, &event.component);
+        moves.iter().any(|one| one.component == name)
+    };
+    let foreseen = run.events_of("move-foreseen").filter(about).map(|event| event.monotonic_ns);
+    let explains = |at: &u64| *at <= trouble && at.saturating_add(CAUSE_WITHIN_NS) >= trouble;
+    foreseen.filter(explains).min().unwrap_or(trouble)
 }
 
 /// When the consumer of a connection had a sample of `epoch`: its agent says so at once, and its

@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use sdr_core::recording::ConnectionSample;
 
+/// What a switch may add to two periods without a sample.
+const SWITCH_NS: u64 = 200_000_000;
+
 /// A connection over the run.
 #[derive(Debug, Default)]
 pub(crate) struct Link {
@@ -17,6 +20,19 @@ pub(crate) struct Pause {
     pub(crate) gap_max_ns: u64,
     /// Median period before, ns; `None` when unknown.
     pub(crate) period_median_ns: Option<u64>,
+}
+
+impl Pause {
+    /// What a pause may be: a sample too many, and the time of a switch.
+    pub(crate) fn bar_ns(&self) -> Option<u64> {
+        let period = self.period_median_ns?;
+        Some(period.saturating_mul(2).saturating_add(SWITCH_NS))
+    }
+
+    /// The bar, when the pause is over it.
+    pub(crate) fn over_ns(&self) -> Option<u64> {
+        self.bar_ns().filter(|bar| self.gap_max_ns > *bar)
+    }
 }
 
 /// How many samples of a connection arrived, and how many did not.
@@ -98,6 +114,12 @@ impl Link {
     pub(crate) fn period_ns(&self) -> Option<u64> {
         let known = self.samples.iter().rfind(|sample| sample.period_median_ns > 0);
         known.map(|sample| sample.period_median_ns)
+    }
+
+    /// How long nothing had been accepted when the newest instance was last looked at.
+    pub(crate) fn silent_ns(&self) -> Option<u64> {
+        let last = self.instances().last().and_then(|samples| samples.last().copied())?;
+        Some(last.monotonic_ns.saturating_sub(last.last_ns))
     }
 
     /// Over all instances.
@@ -199,7 +221,12 @@ mod tests {
         let mut silent = window("robot-2", 5000, 100, 0, 1);
         silent.last_ns = 1195 * MS;
         let link = link(&[window("robot-2", 1200, 100, 70, 1), silent]);
-        assert_eq!(link.pause(1000 * MS, 2000 * MS).unwrap().gap_max_ns, 3805 * MS);
+        let pause = link.pause(1000 * MS, 2000 * MS).unwrap();
+        assert_eq!(pause.gap_max_ns, 3805 * MS);
+        assert_eq!(link.silent_ns(), Some(3805 * MS));
+        assert_eq!(pause.over_ns(), Some(332 * MS));
+        assert_eq!(Pause { gap_max_ns: 332 * MS, ..pause }.over_ns(), None);
+        assert_eq!(Pause { period_median_ns: None, ..pause }.over_ns(), None);
     }
 
     #[test]

@@ -48,6 +48,16 @@ impl Machine {
             commit: option_env!("SDR_COMMIT").map(str::to_owned),
         }
     }
+
+    /// A sentence for a build that does not know what it was made of.
+    pub(crate) fn unknown(&self) -> Option<String> {
+        let known = [("commit", &self.commit), ("rustc", &self.rustc)];
+        let missing: Vec<_> =
+            known.iter().filter(|(_, value)| value.is_none()).map(|(word, _)| *word).collect();
+        (!missing.is_empty()).then(|| {
+            format!("{} of this build unknown: demo.sh builds with them", missing.join(" and "))
+        })
+    }
 }
 
 /// Memory that new work can have without swapping, bytes.

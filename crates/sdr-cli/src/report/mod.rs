@@ -27,7 +27,14 @@ use clap::Args;
 
 use crate::{Session, failure::Failure, output::Format};
 
-use self::{extra::Extra, figures::Figures, read::Recordings, run::Run, summary::Summary};
+use self::{
+    extra::Extra,
+    figures::Figures,
+    machine::Machine,
+    read::{Recordings, Words},
+    run::Run,
+    summary::Summary,
+};
 
 /// Where an agent keeps its recordings.
 const SYSTEM_RECORDINGS: &str = "/var/lib/sdr/recordings";
@@ -87,11 +94,18 @@ impl Report {
     /// Works out everything.
     pub(crate) fn of(recordings: &Recordings, extra: Extra) -> Self {
         let run = Run::new(recordings, extra.until_ns);
-        let figures = Figures::new(&run, &recordings.fixes, &extra);
+        let mut figures = Figures::new(&run, &recordings.fixes, &extra);
+        // Every robot where the port was heard recorded it: the one that heard most has them all.
+        let danger = |words: &&Words| Some(&words.topic) == extra.danger_topic.as_ref();
+        let most = recordings.words.iter().filter(danger).max_by_key(|words| words.said);
+        figures.verdicts = most.map(|words| (words.said, words.yes));
         let mut summary = Summary::new(&run, &figures, &extra);
         summary.notes.extend(recordings.notes.iter().cloned());
         summary.notes.extend(figures.not_activated.iter().cloned());
         summary.notes.extend(figures.not_recovered.iter().cloned());
+        summary.notes.extend(figures.too_long());
+        summary.notes.extend(extra.pictures.as_deref().map(stands));
+        summary.notes.extend(extra.machine.as_ref().and_then(Machine::unknown));
         let name = |path: &PathBuf| fs::canonicalize(path).unwrap_or_else(|_| path.clone());
         let files = recordings.files.iter().map(|path| name(path).display().to_string());
         summary.recordings = files.collect();
@@ -127,6 +141,14 @@ impl Report {
             page.display()
         )
     }
+}
+
+/// Why the rover of a demo with pictures does not drive.
+fn stands(pictures: &str) -> String {
+    format!(
+        "the cameras showed {pictures}, not the tunnel: the rover does not find its place in them \
+         and stands"
+    )
 }
 
 #[cfg(test)]

@@ -70,6 +70,17 @@ pub(crate) struct Fix {
     pub(crate) y_m: f64,
 }
 
+/// What one robot heard on a recorded port of `std_msgs/msg/Bool`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Words {
+    /// The topic it came by.
+    pub(crate) topic: String,
+    /// All of them.
+    pub(crate) said: u64,
+    /// Those that were `true`.
+    pub(crate) yes: u64,
+}
+
 /// All messages of all files, by time.
 #[derive(Debug, Default)]
 pub(crate) struct Recordings {
@@ -89,6 +100,8 @@ pub(crate) struct Recordings {
     pub(crate) events: Vec<EventSample>,
     /// Places.
     pub(crate) fixes: Vec<Fix>,
+    /// Words by recording and topic.
+    pub(crate) words: Vec<Words>,
 }
 
 impl Recordings {
@@ -122,6 +135,7 @@ impl Recordings {
         let stream = MessageStream::new_with_options(&bytes, Options::IgnoreEndMagic.into())
             .map_err(|error| foreign(error.to_string()))?;
         let (mut counts, mut fixes) = (Counts::default(), Vec::new());
+        let mut words = BTreeMap::new();
         for message in stream {
             let message = match message {
                 Ok(message) => message,
@@ -133,7 +147,11 @@ impl Recordings {
             };
             let schema = message.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
             let body = Body { schema, bytes: &message.data, log_time: message.log_time };
-            self.take(&body, &message.channel.topic, &mut counts, &mut fixes);
+            if body.schema == "std_msgs/msg/Bool" {
+                count_word(&body, &message.channel.topic, &mut words);
+            } else {
+                self.take(&body, &message.channel.topic, &mut counts, &mut fixes);
+            }
         }
         if counts.known == 0 {
             return Err(foreign("it holds no message of type sdr_msgs/msg/...".to_owned()));
@@ -141,6 +159,7 @@ impl Recordings {
         if counts.broken > 0 {
             self.note(path, &format!("{} messages cannot be decoded", counts.broken));
         }
+        self.words.extend(words.into_values());
         // Log times are monotonic times plus a constant, which any of the agent's own tells.
         if let Some(offset) = counts.clock_offset_ns {
             self.fixes.extend(fixes.into_iter().map(|fix: Fix| Fix {
@@ -179,6 +198,14 @@ impl Recordings {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         self.notes.push(format!("{name}: {note}"));
     }
+}
+
+fn count_word(body: &Body<'_>, topic: &str, words: &mut BTreeMap<String, Words>) {
+    let Some(yes) = body.decode::<bool>() else { return };
+    let fresh = || Words { topic: topic.to_owned(), said: 0, yes: 0 };
+    let word = words.entry(topic.to_owned()).or_insert_with(fresh);
+    word.said += 1;
+    word.yes += u64::from(yes);
 }
 
 #[derive(Default)]

@@ -33,6 +33,8 @@ pub(crate) struct Summary {
     pub(crate) coordinator: Coordinator,
     pub(crate) position_error_m: Option<PositionError>,
     pub(crate) detector: Option<Detector>,
+    pub(crate) verdicts: Option<Verdicts>,
+    pub(crate) pictures: Option<String>,
     pub(crate) machine: Option<Machine>,
     pub(crate) radio: Option<Radio>,
     pub(crate) events: usize,
@@ -46,6 +48,7 @@ pub(crate) struct Summary {
 pub(crate) struct StreamGap {
     pub(crate) gap_max_ms: f64,
     pub(crate) period_median_ms: Option<f64>,
+    pub(crate) bar_ms: Option<f64>,
 }
 
 /// The same for the commands that reach the wheels.
@@ -64,6 +67,7 @@ pub(crate) struct Samples {
     pub(crate) unheard: Option<u64>,
     pub(crate) fenced: u64,
     pub(crate) late: u64,
+    pub(crate) silent_ms: Option<f64>,
 }
 
 /// What an agent took: medians over the run, and the largest memory.
@@ -82,11 +86,19 @@ pub(crate) struct PositionError {
     pub(crate) max: f64,
 }
 
+/// What the detector said, once for each picture.
+#[derive(Debug, Serialize)]
+pub(crate) struct Verdicts {
+    pub(crate) all: u64,
+    pub(crate) danger: u64,
+}
+
 impl Summary {
     pub(crate) fn new(run: &Run, figures: &Figures, extra: &Extra) -> Self {
         let gap = |pause: &super::link::Pause| StreamGap {
             gap_max_ms: ms(pause.gap_max_ns),
             period_median_ms: pause.period_median_ns.map(ms),
+            bar_ms: pause.bar_ns().map(ms),
         };
         let samples = figures.samples.iter().map(|(name, traffic)| {
             let counts = &traffic.counts;
@@ -97,6 +109,7 @@ impl Summary {
                 lost: counts.lost,
                 fenced: counts.fenced,
                 late: counts.late,
+                silent_ms: run.links.get(name).and_then(|link| link.silent_ns()).map(ms),
             };
             (name.clone(), samples)
         });
@@ -130,6 +143,8 @@ impl Summary {
                 .position_error_m
                 .map(|(mean, max)| PositionError { mean: round(mean), max: round(max) }),
             detector: extra.detector.clone(),
+            verdicts: figures.verdicts.map(|(all, danger)| Verdicts { all, danger }),
+            pictures: extra.pictures.clone(),
             machine: extra.machine.clone(),
             radio: extra.radio.clone(),
             events: run.events.len(),

@@ -1,5 +1,6 @@
 //! A report from recordings written as an agent writes them.
 
+mod known;
 pub(crate) mod story;
 
 use super::*;
@@ -35,8 +36,45 @@ fn the_contract_fields_are_there_and_hold_what_was_recorded() {
     assert_eq!(json["ballast"], true);
     assert!(json["position_error_m"]["mean"].as_f64().unwrap() < 0.11);
     assert_eq!(json["detector"]["stops"], 1);
+    assert_eq!(json["verdicts"], serde_json::json!({ "all": 101, "danger": 31 }));
     assert_eq!(json["recordings"].as_array().unwrap().len(), 3);
     assert_eq!(json["notes"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn a_pause_while_the_next_home_got_ready_counts_and_is_told() {
+    let gap = |foreseen_ms: Option<u64>| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut story = Story::whole();
+        story.silence(19_100, 1700);
+        foreseen_ms.into_iter().for_each(|at_ms| story.foresee(at_ms));
+        story.write(folder.path());
+        let report = Report::make(&[folder.path().to_owned()], story::extra()).unwrap();
+        let json = serde_json::to_value(&report.summary).unwrap();
+        let gap = &json["stream_gap_ms"]["anomaly.danger -> controller.danger"];
+        (gap["gap_max_ms"].as_f64().unwrap(), report.summary.notes.join("\n"))
+    };
+
+    let (late, silent) = gap(None);
+    assert_eq!((late, silent.as_str()), (67.0, ""));
+    let (whole, told) = gap(Some(18_000));
+    assert_eq!(whole, 1700.0);
+    assert!(told.contains("anomaly.danger -> controller.danger paused for 1.70 s"), "{told}");
+}
+
+#[test]
+fn pictures_instead_of_the_world_are_told_and_so_is_an_unknown_build() {
+    let folder = tempfile::tempdir().unwrap();
+    Story::whole().write(folder.path());
+    let mut extra = story::extra();
+    extra.pictures = Some("12 pictures in /photos".to_owned());
+    extra.machine = Some(Machine { commit: None, ..extra.machine.unwrap() });
+
+    let report = Report::make(&[folder.path().to_owned()], extra).unwrap();
+
+    let notes = report.summary.notes.join("\n");
+    assert!(notes.contains("the cameras showed 12 pictures in /photos"), "{notes}");
+    assert!(notes.contains("commit of this build unknown"), "{notes}");
 }
 
 #[test]

@@ -53,6 +53,8 @@ pub const ENV_ORPHAN_MS: &str = "SDR_ORPHAN_MS";
 /// from `on_initialize` to the end. A test aid: the paper's components "allocate a 500MB
 /// memory region on startup and free it on termination".
 pub const BALLAST_PARAMETER: &str = "ballast_bytes";
+/// Most ballast that may be asked for, bytes.
+pub const BALLAST_BYTES_MAX: i64 = 64 << 30;
 
 /// Time between two `counters`.
 pub const COUNTERS_PERIOD: Duration = Duration::from_millis(200);

@@ -82,6 +82,7 @@ fn every_word_of_a_component_survives_the_wire() {
         inputs: Vec::new(),
         outputs: Vec::new(),
         parameters: Vec::new(),
+        devices: Vec::new(),
     };
     let hello = Hello {
         v: PROTOCOL_VERSION,

@@ -3,20 +3,17 @@
 use sdr_core::spec::Value;
 
 use crate::component::ComponentError;
-use crate::protocol::{BALLAST_PARAMETER, Configure};
+use crate::protocol::{BALLAST_BYTES_MAX, BALLAST_PARAMETER, Configure};
 use crate::sys::TouchedMemory;
-
-/// Most that may be asked for, bytes.
-const BYTES_MAX: i64 = 64 << 30;
 
 /// Maps and touches what the parameter asks for; `None` when that is nothing.
 pub(super) fn allocate(configure: &Configure) -> Result<Option<TouchedMemory>, ComponentError> {
     let bytes = match configure.parameters.get(BALLAST_PARAMETER) {
         None | Some(Value::Int(0)) => return Ok(None),
-        Some(Value::Int(bytes)) if (1..=BYTES_MAX).contains(bytes) => *bytes,
+        Some(Value::Int(bytes)) if (1..=BALLAST_BYTES_MAX).contains(bytes) => *bytes,
         Some(other) => {
             return Err(ComponentError::other(format!(
-                "parameter `{BALLAST_PARAMETER}` is {other}; allowed: 0 to {BYTES_MAX}"
+                "parameter `{BALLAST_PARAMETER}` is {other}; allowed: 0 to {BALLAST_BYTES_MAX}"
             )));
         }
     };

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use sdr_core::{
     id::Name,
-    spec::{ComponentProfile, ParameterProfile, PortProfile, Value, port_path},
+    spec::{ComponentProfile, DeviceProfile, ParameterProfile, PortProfile, Value, port_path},
 };
 
 pub use error::SetupError;
@@ -19,7 +19,7 @@ use crate::{
     component::Component,
     message::Message,
     port::{Connection, InPort, InputCore, OutPort, OutputCore, SharedInput, SharedOutput},
-    protocol::{BALLAST_PARAMETER, Configure},
+    protocol::{BALLAST_BYTES_MAX, BALLAST_PARAMETER, Configure},
     shm::Memory,
 };
 
@@ -48,6 +48,7 @@ impl Setup {
             inputs: Vec::new(),
             outputs: Vec::new(),
             parameters: Vec::new(),
+            devices: Vec::new(),
         };
         Self { profile, wiring, inputs: Vec::new(), outputs: Vec::new() }
     }
@@ -110,6 +111,8 @@ impl Setup {
             name: name.to_owned(),
             about: about.to_owned(),
             default: default_value,
+            min: None,
+            max: None,
         });
         match self.configured(name) {
             None => Ok(default),
@@ -122,7 +125,8 @@ impl Setup {
         }
     }
 
-    /// As [`Setup::parameter`], refusing values outside `allowed`.
+    /// As [`Setup::parameter`], refusing values outside `allowed`; the range is told before
+    /// anything is deployed.
     pub fn parameter_within<P>(
         &mut self,
         name: &str,
@@ -134,6 +138,10 @@ impl Setup {
         P: Parameter + PartialOrd + std::fmt::Display,
     {
         let value = self.parameter(name, default, about)?;
+        if let Some(declared) = self.profile.parameters.last_mut() {
+            declared.min = Some(allowed.start().to_value());
+            declared.max = Some(allowed.end().to_value());
+        }
         if allowed.contains(&value) {
             return Ok(value);
         }
@@ -145,16 +153,28 @@ impl Setup {
         })
     }
 
-    /// Where a device of the robot is. Empty while the component only describes itself.
-    pub fn device(&self, name: &str) -> Result<PathBuf, SetupError> {
+    /// Declares that a device of the robot is needed, and tells where it is. Empty while the
+    /// component only describes itself.
+    pub fn device(&mut self, name: &str) -> Result<PathBuf, SetupError> {
+        self.need(DeviceProfile { name: name.to_owned(), unless: None })
+    }
+
+    /// As [`Setup::device`] for one that is not needed where `parameter` has a value other than
+    /// its default; ask for it only where it has not.
+    pub fn device_unless(&mut self, name: &str, parameter: &str) -> Result<PathBuf, SetupError> {
+        self.need(DeviceProfile { name: name.to_owned(), unless: Some(parameter.to_owned()) })
+    }
+
+    fn need(&mut self, device: DeviceProfile) -> Result<PathBuf, SetupError> {
+        let name = device.name.clone();
+        self.profile.devices.push(device);
         match &self.wiring {
             None => Ok(PathBuf::new()),
-            Some(wiring) => match wiring.configure.devices.get(name) {
+            Some(wiring) => match wiring.configure.devices.get(&name) {
                 Some(place) => Ok(PathBuf::from(place)),
-                None => Err(SetupError::NoDevice {
-                    name: name.to_owned(),
-                    known: join(wiring.configure.devices.keys()),
-                }),
+                None => {
+                    Err(SetupError::NoDevice { name, known: join(wiring.configure.devices.keys()) })
+                }
             },
         }
     }
@@ -166,6 +186,8 @@ impl Setup {
             name: BALLAST_PARAMETER.to_owned(),
             about: "bytes to hold and touch from start to end, a test aid; 0 is none".to_owned(),
             default: Value::Int(0),
+            min: Some(Value::Int(0)),
+            max: Some(Value::Int(BALLAST_BYTES_MAX)),
         });
         profile
     }

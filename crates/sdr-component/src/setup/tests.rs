@@ -70,6 +70,11 @@ fn a_component_describes_itself_without_an_agent() {
     let parameters: Vec<&str> =
         profile.parameters.iter().map(|known| known.name.as_str()).collect();
     assert_eq!(parameters, ["score_min", "area", "ballast_bytes"]);
+    let (min, max) = (&profile.parameters[0].min, &profile.parameters[0].max);
+    assert_eq!((min, max), (&Some(Value::Float(0.0)), &Some(Value::Float(1.0))));
+    assert_eq!(profile.parameters[1].min, None);
+    let camera = DeviceProfile { name: String::from("camera"), unless: None };
+    assert_eq!(profile.devices, [camera]);
 }
 
 #[test]

@@ -52,7 +52,8 @@ impl Brain {
                 places.iter().filter(|robot| **robot != self.me).cloned().collect()
             };
             if producers.contains(&self.me) && !far(&consumers).is_empty() {
-                let active = self.forwarded(&producer);
+                let heard = wires.iter().any(|wire| self.runs_afar(&wire.to.component, system));
+                let active = self.forwarded(&producer).filter(|_| heard);
                 routes.push(route(Direction::Out { active }, far(&consumers)));
             }
             if consumers.contains(&self.me) && !far(&producers).is_empty() {
@@ -63,16 +64,32 @@ impl Brain {
 
     /// Robots where a component runs or is prepared; a draining producer still feeds.
     fn places(&self, key: &ComponentKey, side: Side) -> BTreeSet<RobotId> {
-        let Some((version, assignment)) = self.wanted(key) else { return BTreeSet::new() };
+        let Some((_, assignment)) = self.wanted(key) else { return BTreeSet::new() };
         let mut places: BTreeSet<RobotId> = self.keeps_instances(key).cloned().collect();
         places.insert(assignment.home.clone());
-        let draining = assignment.drains.clone().filter(|_| match (&version.epoch, side) {
-            (Some(epoch), Side::Producer) => !self.switched(key, epoch),
-            (Some(_), Side::Consumer) => self.current(key).is_some(),
-            (None, _) => false,
-        });
-        places.extend(draining);
+        places.extend(self.draining(key, side).cloned());
         places
+    }
+
+    /// The old home, as long as it still produces or consumes.
+    fn draining(&self, key: &ComponentKey, side: Side) -> Option<&RobotId> {
+        let (version, assignment) = self.wanted(key)?;
+        let (old, epoch) = (assignment.drains.as_ref()?, version.epoch.as_ref()?);
+        let is_over = match side {
+            // It knows best itself.
+            Side::Consumer if *old == self.me => self.current(key).is_none(),
+            Side::Consumer | Side::Producer => self.switched(key, epoch),
+        };
+        (!is_over).then_some(old)
+    }
+
+    /// Whether a consumer runs on another robot. One that only stands by there is connected,
+    /// but it would throw away what it is sent, and the radio has better things to carry.
+    fn runs_afar(&self, consumer: &Name, system: &SystemNow) -> bool {
+        let key = system.key(consumer);
+        let Some((_, assignment)) = self.wanted(&key) else { return false };
+        let mut running = self.draining(&key, Side::Consumer).into_iter().chain([&assignment.home]);
+        running.any(|robot| *robot != self.me)
     }
 
     /// The token whose samples go out from here: that of the home, or of the old home while

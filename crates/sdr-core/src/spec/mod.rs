@@ -165,6 +165,19 @@ pub struct ComponentProfile {
     /// Parameters it knows; others are refused.
     #[serde(default)]
     pub parameters: Vec<ParameterProfile>,
+    /// Parts of the body it must find.
+    #[serde(default)]
+    pub devices: Vec<DeviceProfile>,
+}
+
+/// A part of the body that a component must find.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DeviceProfile {
+    /// Its name in robot.toml.
+    pub name: alloc::string::String,
+    /// A parameter that makes it unneeded once it is given a value other than its default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unless: Option<alloc::string::String>,
 }
 
 /// One port of a [`ComponentProfile`].
@@ -189,6 +202,12 @@ pub struct ParameterProfile {
     pub about: alloc::string::String,
     /// The value when the system file gives none; its kind is the kind required.
     pub default: Value,
+    /// Least value, of numbers with a range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min: Option<Value>,
+    /// Greatest value, of numbers with a range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max: Option<Value>,
 }
 
 /// What robots announce about the executables they have: a hash of the launch name, 32 bits.

@@ -2,8 +2,11 @@
 
 use std::{ops::RangeInclusive, time::Duration};
 
-use sdr_core::recover::{Cause, GuardPolicy};
-use sdr_recovery::{Ladder, Limits, Policy, PolicyParts, Rule, Rung};
+use sdr_core::{
+    recover::{Cause, GuardPolicy},
+    units::Permille,
+};
+use sdr_recovery::{Ladder, LadderError, Limits, Policy, PolicyParts, Rule, Rung};
 
 use super::{
     conditions::trigger,
@@ -87,13 +90,12 @@ impl PolicyFile for RecoveryFile {
 
 fn ladders(given: Option<Map<At<Vec<Rung>>>>, parts: &mut PolicyParts, reader: &mut Reader) {
     for (name, rungs) in given.map(|ladders| ladders.0).unwrap_or_default() {
-        let Some(rungs) = rungs else { continue };
-        match Ladder::new(rungs.value) {
-            Ok(ladder) => {
-                parts.ladders.retain(|(other, _)| *other != name.value);
-                parts.ladders.push((name.value, ladder));
-            }
+        let ladder = rungs.map(|rungs| Ladder::new(rungs.value)).unwrap_or_else(named_only);
+        parts.ladders.retain(|(other, _)| *other != name.value);
+        match ladder {
+            Ok(ladder) => parts.ladders.push((name.value, ladder)),
             Err(error) => {
+                parts.ladders.extend(named_only().map(|ladder| (name.value.clone(), ladder)));
                 let message = format!("ladder `{}`: {error}", name.value);
                 let help = String::from(
                     "allowed: local-standby, restart, standby-elsewhere, launch-elsewhere in this order, hold last",
@@ -102,6 +104,11 @@ fn ladders(given: Option<Map<At<Vec<Rung>>>>, parts: &mut PolicyParts, reader: &
             }
         }
     }
+}
+
+/// Stands for a ladder with a problem that was told: rules that name it are not at fault.
+fn named_only() -> Result<Ladder, LadderError> {
+    Ladder::new(vec![Rung::Hold])
 }
 
 /// Changes rules by cause and tells which causes were named.
@@ -202,6 +209,10 @@ fn apply_limits(given: LimitsTable, limits: &mut Limits, reader: &mut Reader) {
         limits.retry = retry.value;
     }
     if let Some(share) = given.prepare_after {
+        if share.value > Permille(1000) {
+            let message = format!("{} % of the hold time", share.value.0 / 10);
+            reader.problem(share.mark, message, Some(String::from("allowed: 0% to 100%")));
+        }
         limits.prepare_after = share.value;
     }
     if let Some(guard) = given.guard {

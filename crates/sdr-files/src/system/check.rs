@@ -168,10 +168,11 @@ fn component(
     };
     let place = table.place.map(|place| self::place(place, list)).unwrap_or_default();
     let run = table.run.0?;
+    let executable_mark = run.value.mark;
     let launch =
         Launch::Native { executable: run.value.executable, arguments: run.value.arguments };
     let name = checked_name?;
-    let places = ComponentPlaces { run: run.mark, parameters: parameter_marks };
+    let places = ComponentPlaces { run: executable_mark, parameters: parameter_marks };
     let component = ComponentSpec {
         name,
         index: 0,

@@ -11,6 +11,7 @@ use sdr_core::{
 
 use crate::{
     policy::{AllocationFile, PolicyEntry, RecoveryFile},
+    problem::Mark,
     read::{At, Map, Need, Read, Reader, choices, one_key, quantity, table},
     tree::{Body, Node},
     units,
@@ -174,6 +175,8 @@ pub(crate) struct OnData;
 #[derive(Clone, Debug)]
 pub(crate) struct RunEntry {
     pub(crate) executable: String,
+    /// Where its name stands.
+    pub(crate) mark: Mark,
     pub(crate) arguments: Vec<String>,
 }
 
@@ -204,8 +207,12 @@ impl Read for RunEntry {
             reader.unknown(key.mark, "key", &key.word, &["native"]);
             return None;
         }
+        let mut mark = value.mark;
         let mut words = match &value.body {
-            Body::List(_) => Vec::<String>::read(value, reader)?,
+            Body::List(items) => {
+                mark = items.first().map_or(mark, |first| first.mark);
+                Vec::<String>::read(value, reader)?
+            }
             Body::Nothing
             | Body::Bool(_)
             | Body::Int(_)
@@ -218,7 +225,7 @@ impl Read for RunEntry {
             return None;
         }
         let executable = words.remove(0);
-        Some(Self { executable, arguments: words })
+        Some(Self { executable, mark, arguments: words })
     }
 
     fn schema(generator: &mut SchemaGenerator) -> Schema {

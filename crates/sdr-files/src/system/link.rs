@@ -2,7 +2,7 @@
 
 use sdr_core::{
     record::{FleetValue, RECORD_BYTES_MAX},
-    spec::{ComponentProfile, ComponentSpec, PortProfile, PortRef, Value},
+    spec::{ComponentProfile, ComponentSpec, ParameterProfile, PortProfile, PortRef, Value},
 };
 
 use super::{ComponentPlaces, LoadedSystem};
@@ -23,7 +23,10 @@ pub fn link_profiles(
     let mut reader = Reader::new(system.places.source.clone());
     for (component, places) in system.spec.components.iter_mut().zip(&system.places.components) {
         match profile_of(component, profiles) {
-            Some(profile) => link_parameters(component, places, profile, &mut reader),
+            Some(profile) => {
+                link_parameters(component, places, profile, &mut reader);
+                check_devices(component, places, profile, &mut reader);
+            }
             None => missing(component, places, profiles, &mut reader),
         }
     }
@@ -95,6 +98,45 @@ fn link_parameters(
             );
             let help = format!("allowed: such as {}, its default", parameter.default);
             reader.problem(marks.1, message, Some(help));
+        } else if let Some(allowed) = out_of_range(value, parameter) {
+            reader.problem(marks.1, format!("parameter `{name}` is {value}"), Some(allowed));
+        }
+    }
+}
+
+/// What is allowed instead of a value outside its range.
+fn out_of_range(value: &Value, parameter: &ParameterProfile) -> Option<String> {
+    let found = value.as_f64()?;
+    let bar = |bar: &Option<Value>| bar.as_ref().and_then(Value::as_f64);
+    let under = bar(&parameter.min).is_some_and(|least| found < least);
+    let over = bar(&parameter.max).is_some_and(|greatest| found > greatest);
+    (under || over).then(|| match (&parameter.min, &parameter.max) {
+        (Some(min), Some(max)) => format!("allowed: {min} to {max}"),
+        (Some(min), None) => format!("allowed: {min} or more"),
+        (None, Some(max)) => format!("allowed: {max} or less"),
+        (None, None) => String::from("allowed: its default"),
+    })
+}
+
+/// A device that is not listed is not told to the component, wherever it runs.
+fn check_devices(
+    component: &ComponentSpec,
+    places: &ComponentPlaces,
+    profile: &ComponentProfile,
+    reader: &mut Reader,
+) {
+    let changed = |word: &String| {
+        let default = profile.parameters.iter().find(|known| known.name == *word);
+        let given = component.parameters.iter().find(|(name, _)| name == word);
+        given.is_some_and(|(_, value)| default.is_none_or(|known| known.default != *value))
+    };
+    for device in &profile.devices {
+        let listed = component.devices.iter().any(|name| name.as_str() == device.name);
+        if !listed && !device.unless.as_ref().is_some_and(changed) {
+            let message = format!("{} needs the device `{}`", profile.name, device.name);
+            let or = device.unless.as_ref().map(|word| format!(", or its parameter `{word}`"));
+            let help = format!("add `devices: [{}]`{}", device.name, or.unwrap_or_default());
+            reader.problem(places.run, message, Some(help));
         }
     }
 }
@@ -123,7 +165,10 @@ fn port<'p>(
         return Some(found);
     }
     let names: Vec<&str> = ports.iter().map(|candidate| candidate.name.as_str()).collect();
-    if others.iter().any(|candidate| candidate.name == port.port) {
+    if names.is_empty() {
+        let message = format!("{} has no {word}, and no `{}`", profile.name, port.port);
+        reader.problem(mark, message, None);
+    } else if others.iter().any(|candidate| candidate.name == port.port) {
         let message = format!("{port} is {other} of {}, not an {word}", profile.name);
         let help = format!("allowed: {}", names.join(", "));
         reader.problem(mark, message, Some(help));

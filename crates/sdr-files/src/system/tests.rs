@@ -3,7 +3,7 @@
 use sdr_core::{
     id::Name,
     recover::Cause,
-    spec::{ComponentProfile, ParameterProfile, PortProfile, Value},
+    spec::{ComponentProfile, DeviceProfile, ParameterProfile, PortProfile, Value},
 };
 
 use super::*;
@@ -42,14 +42,20 @@ fn profile(name: &str, input: &str, output: &str) -> ComponentProfile {
             name: String::from("speed"),
             about: String::new(),
             default: Value::Float(0.5),
+            min: Some(Value::Float(0.0)),
+            max: Some(Value::Float(2.0)),
         }],
+        devices: vec![
+            DeviceProfile { name: String::from("wheels"), unless: None },
+            DeviceProfile { name: String::from("eye"), unless: Some(String::from("speed")) },
+        ],
     }
 }
 
 #[test]
 fn linking_fills_message_types_and_makes_whole_numbers_numbers() {
-    let text = "system: s\ncomponents:\n  a: { run: { native: x }, parameters: { speed: 1 } }\n  \
-                b: { run: { native: x } }\nconnections: [a.out -> b.in, b.out -> a.in]\n";
+    let text = "system: s\ncomponents:\n  a: { run: { native: x }, devices: [wheels], parameters: { speed: 1 } }\n  \
+                b: { run: { native: x }, devices: [wheels, eye] }\nconnections: [a.out -> b.in, b.out -> a.in]\n";
     let mut system = parse(text).unwrap();
 
     link_profiles(&mut system, &[profile("x", "in", "out")]).unwrap();
@@ -75,6 +81,32 @@ fn linking_tells_what_is_not_there() {
     ] {
         assert!(text.contains(part), "{part}\n{text}");
     }
+}
+
+#[test]
+fn ranges_and_devices_are_told_before_anything_starts() {
+    let text = "system: s\ncomponents:\n  a:\n    run: { native: x }\n    parameters: { speed: 3 }\n  \
+                b: { run: { native: x }, devices: [wheels] }\n";
+    let mut system = parse(text).unwrap();
+
+    let problems = link_profiles(&mut system, &[profile("x", "in", "out")]).unwrap_err();
+
+    let told: Vec<String> = problems
+        .as_slice()
+        .iter()
+        .map(|problem| {
+            let help = problem.help.as_deref().unwrap_or_default();
+            format!("{}:{} {}; {help}", problem.line, problem.column, problem.message)
+        })
+        .collect();
+    assert_eq!(
+        told,
+        [
+            "4:20 x needs the device `wheels`; add `devices: [wheels]`",
+            "5:26 parameter `speed` is 3; allowed: 0 to 2",
+            "6:24 x needs the device `eye`; add `devices: [eye]`, or its parameter `speed`",
+        ]
+    );
 }
 
 #[test]

@@ -181,6 +181,15 @@ fn plain_message(error: &serde_yaml::Error) -> String {
         let which = which.split('{').next().unwrap_or(which).trim().to_lowercase();
         return format!("too much for one file ({which}); aliases and nesting count each time");
     }
+    let lower = text.to_lowercase();
+    let ours = [
+        ("multiple", "more than one YAML document; allowed: one, without a second `---`"),
+        ("recursive reference", "an alias stands within what it names; allowed: none that does"),
+        ("recursion limit", "nested too deep"),
+    ];
+    if let Some((_, words)) = ours.iter().find(|(theirs, _)| lower.contains(theirs)) {
+        return String::from(*words);
+    }
     let first = text.lines().next().unwrap_or("not YAML").trim();
     let head = first.split(" at line ").next().unwrap_or(first);
     head.trim_end_matches(['.', ',', ' ']).to_owned()

@@ -47,6 +47,7 @@ fn hello() -> Hello {
         inputs: Vec::new(),
         outputs: Vec::new(),
         parameters: Vec::new(),
+        devices: Vec::new(),
     };
     Hello {
         v: PROTOCOL_VERSION,

@@ -43,7 +43,8 @@ struct Leftover {
 }
 
 impl Agent {
-    /// Starts `program` in a process group of its own: the terminal's Ctrl-C is ours alone.
+    /// Starts `program` in a process group of its own: the terminal's Ctrl-C is ours alone. Its
+    /// standard input is held open by us, and when even SIGKILL ends us it ends too.
     pub(super) fn start(
         robot: &'static str,
         program: &Path,
@@ -57,7 +58,8 @@ impl Agent {
         let child = Command::new(program)
             .arg("--config")
             .arg(&places.config)
-            .stdin(Stdio::null())
+            .arg("--end-with-stdin")
+            .stdin(Stdio::piped())
             .stdout(log)
             .stderr(errors)
             .process_group(0)

@@ -82,13 +82,14 @@ path = [{programs}]
 on_agent_death = "stop"
 [ros]
 domain_id = {domain}
+addresses = ["127.0.0.1"]
 [coordinator]
 preference = "{preference}"
 [api]
 socket = {socket}
 [storage]
 state = {state}
-recordings = {{ ports = ["exploration.position.odometry"] }}
+recordings = {{ ports = ["exploration.position.odometry", "exploration.anomaly.danger"] }}
 "#,
         fisheye = quoted(&body.fisheye),
         camera = quoted(&body.camera),

@@ -1,11 +1,13 @@
 //! The demo's temporary folder.
 
 use std::{
-    fs,
+    fs::{self, File},
+    io,
     path::{Path, PathBuf},
     time::Duration,
 };
 
+use rustix::fs::{FlockOperation, flock};
 use tempfile::TempDir;
 
 use crate::failure::Failure;
@@ -17,11 +19,17 @@ const TRIES_MAX: u32 = 40;
 /// Pause between two tries.
 const TRY_EVERY: Duration = Duration::from_millis(25);
 
+/// What the names of all such folders begin with.
+const PREFIX: &str = "sdr-";
+/// Locked as long as the demo lives, however it dies.
+const LOCK: &str = "demo.lock";
+
 /// An empty temporary folder with a short path, removed when dropped. Whoever writes in it must
 /// have ended before.
 pub(crate) struct Folder {
     folder: Option<TempDir>,
     path: PathBuf,
+    _lock: File,
 }
 
 impl Folder {
@@ -30,11 +38,13 @@ impl Folder {
         let parent = std::env::temp_dir();
         let long = parent.as_os_str().len() + "/sdr-123456".len() > PATH_BYTES_MAX;
         let parent = if long { PathBuf::from("/tmp") } else { parent };
-        let folder = tempfile::Builder::new().prefix("sdr-").tempdir_in(&parent);
-        let folder = folder.map_err(|error| {
+        remove_orphans(&parent);
+        let tell = |error: io::Error| {
             Failure::new(format!("cannot make a folder in {}: {error}", parent.display()))
-        })?;
-        Ok(Self { path: folder.path().to_owned(), folder: Some(folder) })
+        };
+        let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(&parent).map_err(tell)?;
+        let lock = hold(folder.path()).map_err(tell)?;
+        Ok(Self { path: folder.path().to_owned(), folder: Some(folder), _lock: lock })
     }
 
     /// Where it is.
@@ -57,6 +67,27 @@ impl Drop for Folder {
     }
 }
 
+/// The lock of a folder; it gets its name when it is held, so that nobody finds it free.
+fn hold(folder: &Path) -> io::Result<File> {
+    let unnamed = folder.join("lock");
+    let lock = File::create(&unnamed)?;
+    flock(&lock, FlockOperation::NonBlockingLockExclusive)?;
+    fs::rename(&unnamed, folder.join(LOCK))?;
+    Ok(lock)
+}
+
+/// Removes the folders of demos that were killed; theirs are the locks that nobody holds.
+fn remove_orphans(parent: &Path) {
+    let entries = fs::read_dir(parent).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(PREFIX)) {
+        let Ok(lock) = File::open(entry.path().join(LOCK)) else { continue };
+        if flock(&lock, FlockOperation::NonBlockingLockExclusive).is_ok() {
+            // Another demo may be at it, or it is another user's.
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,6 +100,24 @@ mod tests {
         fs::write(path.join("w/robot-1/wireless"), "x").unwrap();
         drop(folder);
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn what_a_killed_demo_left_goes_and_what_is_in_use_stays() {
+        let parent = tempfile::tempdir().unwrap();
+        let (orphan, used) = (parent.path().join("sdr-aaaaaa"), parent.path().join("sdr-bbbbbb"));
+        for folder in [&orphan, &used] {
+            fs::create_dir(folder).unwrap();
+            fs::write(folder.join(LOCK), "").unwrap();
+        }
+        fs::create_dir(parent.path().join("sdr-of-others")).unwrap();
+        let held = File::open(used.join(LOCK)).unwrap();
+        flock(&held, FlockOperation::NonBlockingLockExclusive).unwrap();
+
+        remove_orphans(parent.path());
+
+        assert!(!orphan.exists() && used.exists());
+        assert!(parent.path().join("sdr-of-others").exists());
     }
 
     #[test]

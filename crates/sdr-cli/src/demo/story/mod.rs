@@ -51,9 +51,8 @@ const MOVED: [&str; 2] = ["fisheye", "anomaly"];
 /// Plays it.
 pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Failure> {
     let folder = Folder::new()?;
-    for program in system::executables(folder.path())? {
-        locate::component(&program)?;
-    }
+    let programs = system::executables(folder.path())?;
+    locate::all(programs.iter().map(String::as_str))?;
     let world = folder.path().join("w");
     let stage = Stage::start(&world)?;
     let bodies = stage.bodies(&world);
@@ -267,6 +266,8 @@ impl Story<'_> {
             truth: self.stage.truth(),
             commands_ns: self.stage.commands_ns(),
             detector: self.plan.images.is_none().then(|| self.stage.detector(until_ns)),
+            pictures: self.plan.images.as_ref().map(|images| images.sentence()),
+            danger_topic: Some(format!("/{}/anomaly/danger", spec.name)),
         }
     }
 

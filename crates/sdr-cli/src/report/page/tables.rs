@@ -95,7 +95,7 @@ fn behaviour(report: &Report) -> Vec<[String; 4]> {
     if let Some(detector) = &report.extra.detector {
         let after = detector.stop_after_ms.map(|ms| format!("{:.2} s", ms / 1e3));
         let what = format!(
-            "from its appearance until the robot stood, {} before it; shown {}, stops {}, stops without cause {}",
+            "from its appearance until the robot stood, {} before it; shown {}, stops {}, stops without cause {}; the path stays inside its area, so the stop at its edge is not shown",
             or_dash(detector.stop_distance_m.map(|m| format!("{m:.2} m"))),
             detector.shown,
             detector.stops,
@@ -106,6 +106,10 @@ fn behaviour(report: &Report) -> Vec<[String; 4]> {
             after.unwrap_or_else(|| "did not stop".to_owned()),
             what,
         ));
+    }
+    if let Some((all, danger)) = figures.verdicts {
+        let what = format!("pictures taken for dangerous, of {all} that the detector looked at");
+        rows.push(row("danger seen", danger.to_string(), what));
     }
     rows
 }
@@ -207,7 +211,10 @@ pub(super) fn connections(report: &Report) -> String {
                 counts.fenced.to_string(),
                 counts.late.to_string(),
                 or_dash(period.map(duration)),
-                or_dash(pause.map(|pause| duration(pause.gap_max_ns))),
+                or_dash(pause.map(|pause| {
+                    let over = pause.over_ns().map(|bar| format!(" (bar {})", duration(bar)));
+                    format!("{}{}", duration(pause.gap_max_ns), over.unwrap_or_default())
+                })),
             ]
         })
         .collect();

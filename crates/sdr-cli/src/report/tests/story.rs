@@ -15,10 +15,7 @@ use sdr_core::recording::{
 };
 use serde::Serialize;
 
-use crate::report::{
-    extra::{Bars, Coordinator, Detector, Extra, Radio, TruthPoint},
-    machine::Machine,
-};
+pub(crate) use super::known::extra;
 
 pub(crate) const MS: u64 = 1_000_000;
 /// Log times are monotonic times and this.
@@ -38,57 +35,6 @@ struct Message {
     type_name: &'static str,
     definition: &'static str,
     cdr: Vec<u8>,
-}
-
-/// What a demo would know of it.
-pub(crate) fn extra() -> Extra {
-    let truth = (0..600).map(|tick: u32| TruthPoint {
-        monotonic_ns: u64::from(tick) * 50 * MS,
-        x_m: 1.5 + f64::from(tick) * 0.015,
-        y_m: -0.8,
-    });
-    // Every 20 ms, once 24 ms.
-    let commands =
-        (0..1400_u64).map(|tick| (1000 + tick * 20 + if tick > 1000 { 4 } else { 0 }) * MS);
-    let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
-    Extra {
-        ballast: Some(true),
-        machine: Some(Machine::here()),
-        radio: Some(Radio {
-            robot: "robot-1".to_owned(),
-            from_dbm: -47.0,
-            to_dbm: -55.0,
-            noise_db: 0.5,
-            fade_s: 1.5,
-            carrier: "loopback".to_owned(),
-        }),
-        bars: Some(Bars {
-            allocation_memory_bytes: Some(500_000_000),
-            relaxed_memory_bytes: Some(250_000_000),
-            recovery_memory_bytes: Some(200_000_000),
-            recovery_rssi_dbm: Some(-52.5),
-            recovery_rssi_hold_s: Some(6.0),
-        }),
-        coordinator: Coordinator::default(),
-        components: names(&["fisheye", "anomaly", "camera", "controller", "position"]),
-        connections: names(&[
-            "fisheye.image -> anomaly.image",
-            "anomaly.danger -> controller.danger",
-            "camera.image -> position.image",
-            "position.odometry -> controller.odometry",
-            "controller.wheels -> position.wheels",
-        ]),
-        until_ns: Some(26_000 * MS),
-        position_topic: Some("/exploration/position/odometry".to_owned()),
-        truth: truth.collect(),
-        commands_ns: commands.collect(),
-        detector: Some(Detector {
-            shown: 1,
-            stops: 1,
-            stop_after_ms: Some(420.0),
-            ..Detector::default()
-        }),
-    }
 }
 
 impl Story {
@@ -121,8 +67,34 @@ impl Story {
         story.connections();
         for tick in 0..100_u64 {
             story.odometry(2000 + tick * 100);
+            story.word("robot-1", 2000 + tick * 100, tick >= 70);
+            story.word("robot-2", 2000 + tick * 100, tick >= 70);
         }
+        story.word("robot-2", 13_000, true);
         story
+    }
+
+    /// The next home of the two began to get ready at this moment.
+    pub(crate) fn foresee(&mut self, at_ms: u64) {
+        for component in ["fisheye", "anomaly"] {
+            let event = EventSample {
+                monotonic_ns: at_ms * MS,
+                kind: "move-foreseen".to_owned(),
+                robot: "robot-2".to_owned(),
+                system: SYSTEM.to_owned(),
+                component: component.to_owned(),
+                ..EventSample::default()
+            };
+            self.add("robot-2", at_ms, &event);
+        }
+    }
+
+    /// The detector's word was silent for so long until just before this moment.
+    pub(crate) fn silence(&mut self, at_ms: u64, gap_ms: u64) {
+        let name = "anomaly.danger -> controller.danger";
+        let mut silent = window("robot-2", name, at_ms, 1900);
+        silent.gap_max_ns = gap_ms * MS;
+        self.add("robot-2", at_ms, &silent);
     }
 
     /// Writes `<robot>.mcap` for each robot.
@@ -288,6 +260,16 @@ impl Story {
             };
             self.add(robot, 25_000, &sample);
         }
+    }
+
+    fn word(&mut self, robot: &'static str, at_ms: u64, danger: bool) {
+        self.messages.entry(robot).or_default().push(Message {
+            at_ns: at_ms * MS,
+            topic: "/exploration/anomaly/danger".to_owned(),
+            type_name: "std_msgs/msg/Bool",
+            definition: "",
+            cdr: cdr(&danger),
+        });
     }
 
     fn odometry(&mut self, at_ms: u64) {
