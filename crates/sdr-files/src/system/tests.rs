@@ -104,7 +104,7 @@ fn ranges_and_devices_are_told_before_anything_starts() {
         [
             "4:20 x needs the device `wheels`; add `devices: [wheels]`",
             "5:26 parameter `speed` is 3; allowed: 0 to 2",
-            "6:24 x needs the device `eye`; add `devices: [eye]`, or its parameter `speed`",
+            "6:23 x needs the device `eye`; add `devices: [eye]`, or its parameter `speed`",
         ]
     );
 }
