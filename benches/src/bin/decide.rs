@@ -43,7 +43,18 @@ impl Probe for Watch {
         let what = match &input {
             Input::Datagram { .. } => "datagram",
             Input::Tick => "tick",
-            _ => "other",
+            Input::Host(_)
+            | Input::Facts(_)
+            | Input::Usage(_)
+            | Input::Instance { .. }
+            | Input::Route { .. }
+            | Input::Deploy { .. }
+            | Input::Undeploy { .. }
+            | Input::MoveRole { .. }
+            | Input::RolePolicy { .. }
+            | Input::Planned { .. }
+            | Input::Stored { .. }
+            | Input::StoreFailed { .. } => "other",
         };
         let leads = brain.mesh().fleet().role().is_some_and(|role| brain.robot() == &role.holder);
         let begun = cpu_ns();
