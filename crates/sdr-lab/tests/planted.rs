@@ -9,7 +9,7 @@ use sdr_core::planted::{Defect, plant};
 use sdr_lab::sim::{Scenario, Telling};
 
 /// Seeds tried for one defect; those that break a rule without it are left out.
-const SEEDS: u64 = 200;
+const SEEDS: u64 = 1000;
 const THREADS: usize = 2;
 
 /// The first seed of `seeds` that breaks a rule, and the rule.
