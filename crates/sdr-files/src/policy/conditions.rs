@@ -89,11 +89,14 @@ fn reported(
         }
         Cause::Hung => {
             if let Some(time) = &changes.r#for {
+                let others = RuleChanges { r#for: None, ..changes.clone() };
+                refuse_condition(cause.value, &others, reader);
                 return hang_limit(time, reader).map(Trigger::Silent);
             }
         }
         Cause::RobotGone => {
             if let Some(time) = &changes.lost_after {
+                refuse_condition(cause.value, changes, reader);
                 check_least(time.value, LOST_MIN, time.mark, reader);
                 return Some(Trigger::Lost(time.value));
             }
