@@ -25,6 +25,7 @@ impl Brain {
                     self.stir.fleet = true;
                     self.note_home(now, &key);
                     changed.note(&key);
+                    self.take_latch(&key);
                 }
                 MeshNews::Alive(robot) => {
                     self.note_presence(&robot);
