@@ -106,6 +106,7 @@ impl Brain {
             | Report::Instance(_)
             | Report::Condition(_)
             | Report::Succession(_)
+            | Report::Hold(_)
             | Report::Homeless(_) => None,
         });
         links.collect()
@@ -127,6 +128,7 @@ impl Brain {
                     | Report::Link(..)
                     | Report::Instance(_)
                     | Report::Succession(_)
+                    | Report::Hold(_)
                     | Report::Homeless(_) => None,
                 },
             );

@@ -10,6 +10,7 @@
 //! `decide` acts only on the coordinator, and only mints records; every robot `reconcile`s
 //! what should be on itself with what is. Nothing is ever told to another robot but records.
 
+mod adopt;
 mod conditions;
 mod config;
 mod deadlines;
@@ -21,6 +22,7 @@ mod fitness;
 mod gone;
 mod guard;
 mod handover;
+mod hold;
 mod index;
 mod instances;
 mod isolation;
@@ -72,6 +74,7 @@ use crate::{
 };
 use epochs::EpochBook;
 use guard::GuardDesk;
+use hold::Holds;
 use index::{Index, Stir};
 use instances::{Instance, RunBook};
 use isolation::Lease;
@@ -153,6 +156,7 @@ pub struct Brain {
     desk: Desk,
     desk_of_role: RoleDesk,
     lease: Lease,
+    holds: Holds,
     duplicates_told: BTreeSet<core::net::SocketAddr>,
 }
 
@@ -230,6 +234,7 @@ impl Brain {
             desk: Desk::default(),
             desk_of_role: RoleDesk::default(),
             lease: Lease::default(),
+            holds: Holds::default(),
             duplicates_told: BTreeSet::new(),
         });
         brain.refresh_all_systems();
@@ -263,6 +268,7 @@ impl Brain {
             | Input::Undeploy { .. }
             | Input::MoveRole { .. }
             | Input::RolePolicy { .. }
+            | Input::Hold { .. }
             | Input::Planned { .. }
             | Input::Stored { .. }
             | Input::StoreFailed { .. } => self.stir = Stir::ALL,
@@ -288,6 +294,7 @@ impl Brain {
             Input::Undeploy { request, system } => self.handle_undeploy(request, &system),
             Input::MoveRole { request, to } => self.handle_move_role(request, &to),
             Input::RolePolicy { request, policy } => self.handle_role_policy(request, *policy),
+            Input::Hold { time } => self.announce_hold(time),
             Input::Planned { plan, result } => self.handle_planned(now, plan, result),
             Input::Stored { ticket } => self.handle_stored(ticket),
             Input::StoreFailed { ticket, reason } => self.handle_store_failed(ticket, &reason),

@@ -18,7 +18,10 @@ impl Brain {
         let mut changed = Changed::default();
         while let Some(news) = self.mesh.poll_news() {
             match news {
-                MeshNews::Report(_) => self.stir = Stir::ALL,
+                MeshNews::Report(robot) => {
+                    self.note_hold(now, &robot);
+                    self.stir = Stir::ALL;
+                }
                 MeshNews::Record(key) => {
                     self.desk.mark_dirty();
                     self.stir = Stir::ALL;

@@ -188,6 +188,7 @@ impl Brain {
             | Report::Link(..)
             | Report::Condition(_)
             | Report::Succession(_)
+            | Report::Hold(_)
             | Report::Homeless(_) => None,
         });
         instances.collect()

@@ -222,6 +222,7 @@ impl Brain {
             | crate::report::Report::Link(..)
             | crate::report::Report::Condition(_)
             | crate::report::Report::Succession(_)
+            | crate::report::Report::Hold(_)
             | crate::report::Report::Homeless(_) => None,
         })
     }
@@ -234,6 +235,7 @@ impl Brain {
             | crate::report::Report::Link(..)
             | crate::report::Report::Condition(_)
             | crate::report::Report::Succession(_)
+            | crate::report::Report::Hold(_)
             | crate::report::Report::Homeless(_) => None,
         })
     }
@@ -246,6 +248,7 @@ impl Brain {
             | crate::report::Report::Link(..)
             | crate::report::Report::Condition(_)
             | crate::report::Report::Succession(_)
+            | crate::report::Report::Hold(_)
             | crate::report::Report::Homeless(_) => None,
         })
     }

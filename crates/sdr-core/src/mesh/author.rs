@@ -79,6 +79,7 @@ impl AuthorKey {
             Report::Condition(condition) => Self::condition(&condition.system, condition.cause),
             Report::Succession(_) => Self::succession(),
             Report::Homeless(homeless) => Self::homeless(&homeless.component),
+            Report::Hold(_) => Self(String::from("w")),
         }
     }
 }
@@ -124,6 +125,11 @@ impl Author {
     /// All it says at present, by key.
     pub fn reports(&self) -> impl Iterator<Item = &Report> {
         self.entries.values().filter_map(|entry| entry.report.as_ref())
+    }
+
+    /// Which life of its speaks.
+    pub fn incarnation(&self) -> Incarnation {
+        self.incarnation
     }
 
     /// All its records up to this number are known.

@@ -114,7 +114,7 @@ fn latest_edition(fleet: &Fleet, on: &[usize]) -> Option<String> {
             else {
                 continue;
             };
-            if spec.needs != process.needs {
+            if spec.needs != process.spec.needs {
                 return Some(format!("{key} runs an old edition on robot-{}", robot + 1));
             }
         }
@@ -152,7 +152,8 @@ fn instances_of(
         | Report::Link(..)
         | Report::Condition(_)
         | Report::Homeless(_)
-        | Report::Succession(_) => None,
+        | Report::Succession(_)
+        | Report::Hold(_) => None,
     });
     instances.collect()
 }
