@@ -24,7 +24,9 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::{Parser, Subcommand};
 
 use crate::{
-    command::{completions, deploy, events, keys, logs, role, sim, status, undeploy, validate},
+    command::{
+        completions, deploy, events, keys, logs, role, sim, status, stop, undeploy, validate,
+    },
     failure::Failure,
     output::{Format, Output},
 };
@@ -72,6 +74,8 @@ enum Command {
     Events(events::EventsArgs),
     /// Show what a component wrote
     Logs(logs::LogsArgs),
+    /// End a robot's components, and then its agent
+    Stop(stop::StopArgs),
     /// Show, explain and change who coordinates
     Role(role::RoleArgs),
     /// Make, give out and take back the fleet's keys
@@ -105,6 +109,7 @@ async fn run(command: Command, session: &Session) -> Result<ExitCode, Failure> {
         Command::Status(args) => status::run(args, session).await,
         Command::Events(args) => events::run(args, session).await,
         Command::Logs(args) => logs::run(args, session).await,
+        Command::Stop(args) => stop::run(args, session).await,
         Command::Role(args) => role::run(args, session).await,
         Command::Keys(args) => keys::run(args, session).await,
         Command::Report(args) => report::run(args, session).await,

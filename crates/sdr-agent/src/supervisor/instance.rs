@@ -29,6 +29,8 @@ pub(super) struct Life {
     unlinked_at: Option<Instant>,
     /// Whether it was seen initialised.
     initialized: bool,
+    /// Whether it is to greet after the death of an agent.
+    returning: bool,
     /// Whether the present delay was told.
     told: bool,
 }
@@ -37,6 +39,8 @@ pub(super) struct Life {
 enum Phase {
     /// The process runs; it has not greeted yet.
     Starting,
+    /// It outlived an agent, and has not greeted this one yet.
+    Returning,
     /// It was configured; `on_initialize` runs.
     Initializing,
     /// Beats are due, a few.
@@ -103,8 +107,20 @@ impl Life {
             order_since: now,
             unlinked_at: None,
             initialized: false,
+            returning: false,
             told: false,
         }
+    }
+
+    /// It ran before this agent did, and greets soon.
+    pub(super) fn adopted(&mut self) {
+        self.phase = Phase::Returning;
+        self.returning = true;
+    }
+
+    /// Whether its first greeting after the death of an agent is still to come.
+    pub(super) fn is_returning(&self) -> bool {
+        self.returning
     }
 
     /// `configure` was sent.
@@ -161,6 +177,7 @@ impl Life {
 
     /// It connected, anew or at first.
     pub(super) fn linked(&mut self, now: Instant) {
+        self.returning = false;
         if self.unlinked_at.take().is_some() {
             self.told = false;
             self.restart_beats(now);
@@ -195,6 +212,7 @@ impl Life {
         match self.phase {
             Phase::Finishing | Phase::Terminating | Phase::Killed => true,
             Phase::Starting
+            | Phase::Returning
             | Phase::Initializing
             | Phase::Inactive
             | Phase::Active
@@ -236,6 +254,7 @@ impl Life {
         let patience = &self.patience;
         let (limit, what) = match self.phase {
             Phase::Starting => (patience.hello, What::Greeting),
+            Phase::Returning => (patience.reconnect, What::Greeting),
             Phase::Initializing => (patience.initialize, What::Initialized),
             Phase::Inactive | Phase::Active | Phase::Error if !self.orders.is_empty() => {
                 return self.sooner(self.wait_for_answer());
@@ -264,6 +283,7 @@ impl Life {
         let matters = match self.phase {
             Phase::Initializing | Phase::Inactive | Phase::Active | Phase::Error => true,
             Phase::Starting
+            | Phase::Returning
             | Phase::Finalized
             | Phase::Finishing
             | Phase::Terminating
@@ -288,6 +308,7 @@ impl Life {
         // News of a component that is being ended do not stop its end.
         let rank = |phase| match phase {
             Phase::Starting
+            | Phase::Returning
             | Phase::Initializing
             | Phase::Inactive
             | Phase::Active

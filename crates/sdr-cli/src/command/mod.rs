@@ -8,6 +8,7 @@ pub(crate) mod logs;
 pub(crate) mod role;
 pub(crate) mod sim;
 pub(crate) mod status;
+pub(crate) mod stop;
 pub(crate) mod undeploy;
 pub(crate) mod validate;
 
