@@ -4,4 +4,6 @@ mod by_hand;
 mod demo;
 mod garbage;
 mod keys;
+mod life;
+mod limits;
 mod role;
