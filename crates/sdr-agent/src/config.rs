@@ -128,6 +128,7 @@ pub(crate) fn supervisor(config: &RobotConfig) -> SupervisorConfig {
         on_agent_death: config.components.on_agent_death,
         devices,
         memory: shared_memory(config),
+        cgroup: config.components.cgroup.clone(),
         patience: Patience::default(),
     }
 }

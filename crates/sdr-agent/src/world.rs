@@ -13,9 +13,8 @@ use sdr_core::{
     input::Input,
 };
 use sdr_files::RobotConfig;
-use sdr_files::robot::OnAgentDeath;
 use thiserror::Error;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 
 use crate::api::{self, AnswerDesk, Api, ApiError, ApiState, LatestPlan, Profiles, Question};
 use crate::blobs::{BlobStore, StoreError, Streams, StreamsError};
@@ -32,8 +31,9 @@ use crate::mesh::{
 use crate::metrics::{Metrics, SensorPorts, Watch};
 use crate::programs::Programs;
 use crate::record::{self, RecordSender, Recorder, RecorderNews};
+use crate::run::Ending;
 use crate::store::{self, Remembered, Store};
-use crate::supervisor::{self, Outlets, Supervisor};
+use crate::supervisor::{self, Left, Outlets, Supervisor, Survivor, Whom};
 use crate::taps::{self, Listeners, PortTypes};
 use crate::trouble::Trouble;
 use crate::{clock, config, memory};
@@ -93,6 +93,8 @@ pub(crate) enum StartError {
 pub(crate) struct World {
     /// Metrics, mesh, and what came of effects.
     pub(crate) inputs: mpsc::Receiver<Input>,
+    /// What the brain must be told before anything else.
+    pub(crate) adopted: Vec<Input>,
     /// From the API.
     pub(crate) questions: mpsc::Receiver<Question>,
     /// Who takes orders.
@@ -103,7 +105,6 @@ pub(crate) struct World {
     metrics: Metrics,
     recorder: Option<Recorder>,
     memory: SharedMemory,
-    on_agent_death: OnAgentDeath,
     /// Robots that the data plane knows.
     robots: Vec<RobotId>,
     /// Held as long as this agent lives.
@@ -117,6 +118,7 @@ struct Ground {
     recorder: Option<Recorder>,
     record: RecordSender,
     stored: Option<StoredState>,
+    survivors: Vec<Survivor>,
 }
 
 /// What other crates fill in for the brain.
@@ -129,8 +131,11 @@ fn seams() -> Seams {
 }
 
 impl World {
-    /// Makes everything. Call within a `LocalSet`.
-    pub(crate) async fn start(robot: &RobotConfig) -> Result<(Box<Brain>, Self), StartError> {
+    /// Makes everything. Call within a `LocalSet`; who ends the agent by the API tells `ending`.
+    pub(crate) async fn start(
+        robot: &RobotConfig,
+        ending: watch::Sender<Ending>,
+    ) -> Result<(Box<Brain>, Self), StartError> {
         let state = &robot.storage.state;
         fs::create_dir_all(state).map_err(at("make", state))?;
         let lock = lock(state)?;
@@ -161,8 +166,9 @@ impl World {
         };
         let supervisor_config = config::supervisor(robot);
         let logs = supervisor_config.logs.clone();
-        let supervisor = Supervisor::start(supervisor_config, outlets.clone())
-            .map_err(because("components' socket"))?;
+        let (supervisor, adopted) =
+            Supervisor::start(supervisor_config, outlets.clone(), ground.survivors)
+                .map_err(because("components' socket"))?;
         let store = Store::start(state.clone(), sender.clone(), ground.events.clone())
             .map_err(because("store"))?;
         let (metrics, data) = start_senses(robot, outlets)?;
@@ -183,6 +189,7 @@ impl World {
             profiles: Profiles::new(config::component_path(robot)),
             keys: keys.clone(),
             streams,
+            ending,
         };
         let api = Api::start(robot.api.socket.clone(), listener, remote, api_state);
         installed.watch();
@@ -193,6 +200,7 @@ impl World {
             Effects { mesh, store, supervisor, data, desk, events, plan, programs, inputs: sender };
         let world = Self {
             inputs,
+            adopted,
             questions,
             effects,
             mesh_watch: MeshWatch::new(trouble, keys),
@@ -200,7 +208,6 @@ impl World {
             metrics,
             recorder: ground.recorder,
             memory: config::shared_memory(robot),
-            on_agent_death: robot.components.on_agent_death,
             robots: Vec::new(),
             _lock: ground.lock,
         };
@@ -218,21 +225,21 @@ impl World {
         }
     }
 
-    /// Ends everything, the last first; components go on when they are to be kept.
-    pub(crate) async fn stop(mut self) {
+    /// Ends everything, the last first; of the components those that `whom` says.
+    pub(crate) async fn stop(mut self, whom: Whom) {
         self.api.stop();
         // Nobody reads them any more; whoever sends is told so instead of waiting.
         self.inputs.close();
-        self.effects.supervisor.stop().await;
+        let left = self.effects.supervisor.stop(whom).await;
         drop(self.metrics);
         let Effects { data, store, events, .. } = self.effects;
         data.stop();
         drop(store);
         events.publish(events.new_event("agent-stopped", "told to stop"));
         drop(self.recorder);
-        match self.on_agent_death {
-            OnAgentDeath::Keep => {}
-            OnAgentDeath::Stop => memory::clean(&self.memory),
+        match left {
+            Left::Some => {}
+            Left::Nothing => memory::clean(&self.memory),
         }
     }
 }
@@ -260,12 +267,16 @@ async fn start_mesh(
     Ok((mesh, Some(streams)))
 }
 
-/// Reads what was remembered and clears what a predecessor left.
+/// Reads what was remembered, finds what a predecessor left running, and clears the rest.
 fn prepare(robot: &RobotConfig, lock: File) -> Result<Ground, StartError> {
     let state = &robot.storage.state;
     let events = Events::new(robot.name.clone());
-    supervisor::end_leftovers(state, &events);
-    memory::clean(&config::shared_memory(robot));
+    let survivors = supervisor::find_survivors(&config::supervisor(robot), &events);
+    if survivors.is_empty() {
+        // Nobody uses it: what is there was left by the dead. With survivors, opening it gives
+        // back what only the dead used.
+        memory::clean(&config::shared_memory(robot));
+    }
     let recorder = start_recorder(robot, &events)?;
     let record = match &recorder {
         Some(recorder) => recorder.sender(),
@@ -286,7 +297,7 @@ fn prepare(robot: &RobotConfig, lock: File) -> Result<Ground, StartError> {
     let started = format!("sdr-agent {} on {}", env!("CARGO_PKG_VERSION"), robot.name);
     let pid = f64::from(std::process::id());
     events.publish(events.new_event("agent-started", started).number("pid", pid));
-    Ok(Ground { lock, events, recorder, record, stored })
+    Ok(Ground { lock, events, recorder, record, stored, survivors })
 }
 
 fn start_recorder(robot: &RobotConfig, events: &Events) -> Result<Option<Recorder>, StartError> {

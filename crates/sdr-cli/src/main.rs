@@ -25,7 +25,7 @@ use clap::{Parser, Subcommand};
 
 use crate::{
     command::{
-        completions, deploy, events, keys, logs, policy, reset, role, sim, status, undeploy,
+        completions, deploy, events, keys, logs, policy, reset, role, sim, status, stop, undeploy,
         validate,
     },
     failure::Failure,
@@ -79,6 +79,8 @@ enum Command {
     Reset(reset::ResetArgs),
     /// Say in words what a recovery policy does
     Policy(policy::PolicyArgs),
+    /// End a robot's components, and then its agent
+    Stop(stop::StopArgs),
     /// Show, explain and change who coordinates
     Role(role::RoleArgs),
     /// Make, give out and take back the fleet's keys
@@ -114,6 +116,7 @@ async fn run(command: Command, session: &Session) -> Result<ExitCode, Failure> {
         Command::Logs(args) => logs::run(args, session).await,
         Command::Reset(args) => reset::run(args, session).await,
         Command::Policy(args) => policy::run(args, session),
+        Command::Stop(args) => stop::run(args, session).await,
         Command::Role(args) => role::run(args, session).await,
         Command::Keys(args) => keys::run(args, session).await,
         Command::Report(args) => report::run(args, session).await,

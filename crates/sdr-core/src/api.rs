@@ -286,6 +286,13 @@ pub struct PlanView {
     pub homeless: Vec<Homeless>,
 }
 
+/// Answer of `POST /v1/stop`: components end, then the agent.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StopAnswer {
+    /// Whose.
+    pub robot: String,
+}
+
 /// Any refusal of the API: HTTP status 4xx or 5xx.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ErrorAnswer {

@@ -1,20 +1,21 @@
 //! Everything the brain can be told.
 
 use alloc::{boxed::Box, string::String, vec::Vec};
-use core::net::SocketAddr;
+use core::{net::SocketAddr, time::Duration};
 
 use crate::{
     allocate::{AllocError, Plan},
+    effect::InputWiring,
     fitness::RolePolicy,
     id::{ComponentKey, Name, RobotId},
     lifecycle::LifecycleState,
     order::Token,
     recover::Cause,
     report::{HostReport, RobotFacts, Usage},
-    spec::SystemSpec,
+    spec::{ComponentSpec, SystemSpec},
 };
 
-/// Names one started process of a component on this robot; grows within one agent process.
+/// Names one started process of a component on this robot; grows, also past those adopted.
 pub type InstanceId = u64;
 /// Names one request of an API client.
 pub type RequestId = u64;
@@ -110,6 +111,11 @@ pub enum Input {
         /// What it found; the error is for people.
         result: Result<Vec<Finding>, String>,
     },
+    /// The agent is about to be away for a planned moment: others are to know.
+    Hold {
+        /// How long at most.
+        time: Duration,
+    },
     /// A plan is ready.
     Planned {
         /// Of which question.
@@ -131,9 +137,25 @@ pub enum Input {
     },
 }
 
+/// A process that outlived the agent which started it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Adoption {
+    /// Process id; the shell made sure that it is the same process.
+    pub pid: u32,
+    /// The component it is an instance of.
+    pub component: ComponentKey,
+    /// What it was started with.
+    pub spec: ComponentSpec,
+    /// How it was wired.
+    pub inputs: Vec<InputWiring>,
+}
+
 /// What happened to an instance.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InstanceNews {
+    /// It outlived the agent before this one and goes on; told before anything else. Its
+    /// state follows when it greets.
+    Adopted(Box<Adoption>),
     /// Its process runs.
     Started {
         /// Process id.
@@ -169,6 +191,11 @@ pub enum InstanceNews {
     },
     /// Its process ended.
     Exited {
+        /// Status and last lines of output.
+        reason: String,
+    },
+    /// Its process ended because memory was short: its limit's, or the robot's.
+    OutOfMemory {
         /// Status and last lines of output.
         reason: String,
     },

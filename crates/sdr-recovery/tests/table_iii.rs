@@ -43,7 +43,7 @@ fn short_memory_restarts_the_largest_component_first_and_one_at_a_time() {
     assert_eq!(verdicts.len(), 1);
     assert_eq!(verdicts[0].0, 3_000);
     assert_eq!(verdicts[0].1.component, key("anomaly"));
-    assert_eq!(verdicts[0].1.remedy, restart_after(200));
+    assert_eq!(verdicts[0].1.remedy, restart_after(0));
     assert_eq!(verdicts[0].1.reason, "memory_free 100 MB, bar 100 MB, held 2.0 s; restart 1 of 3");
 }
 
@@ -62,7 +62,7 @@ fn short_memory_that_restarting_does_not_mend_moves_the_component_then_takes_the
     }
     assert_eq!(
         seen,
-        [restart_after(200), restart_after(400), restart_after(800), Remedy::LaunchElsewhere]
+        [restart_after(0), restart_after(200), restart_after(400), Remedy::LaunchElsewhere]
     );
 
     scene.leaves("anomaly");
@@ -100,7 +100,7 @@ fn a_component_that_takes_too_much_cpu_is_restarted_and_its_neighbour_left_alone
 
     assert_eq!(verdicts[0].0, 11_000);
     assert_eq!(verdicts[0].1.cause, Cause::ComponentCpuHigh);
-    assert_eq!(verdicts[0].1.remedy, restart_after(200));
+    assert_eq!(verdicts[0].1.remedy, restart_after(0));
     assert_eq!(verdicts.len(), 1);
 }
 
@@ -124,7 +124,7 @@ fn exits_hangs_and_errors_without_a_reason_are_restarted_here() {
         let mut scene = scene();
         let verdicts = scene.fails(5, "anomaly", cause);
         assert_eq!(verdicts.len(), 1);
-        assert_eq!((verdicts[0].cause, verdicts[0].remedy), (cause, restart_after(200)));
+        assert_eq!((verdicts[0].cause, verdicts[0].remedy), (cause, restart_after(0)));
         assert_eq!(verdicts[0].held_over_at, at(5));
         assert!(scene.judge_at(6).is_empty(), "an order is given once");
     }

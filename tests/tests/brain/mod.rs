@@ -1,5 +1,6 @@
 //! Brains of two and three robots in virtual time.
 
+mod adoption;
 mod again;
 mod deployment;
 mod own_recovery;

@@ -4,5 +4,7 @@ mod by_hand;
 mod demo;
 mod garbage;
 mod keys;
+mod life;
+mod limits;
 mod role;
 mod standby;

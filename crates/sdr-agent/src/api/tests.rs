@@ -46,6 +46,7 @@ impl Bench {
             profiles: Profiles::new(bin),
             keys: None,
             streams: None,
+            ending: watch::channel(Ending::NotYet).0,
         };
         let listener = open(&path).await.unwrap();
         let api = Api::start(path, listener, None, state.clone());

@@ -31,6 +31,8 @@ pub(super) struct Life {
     unlinked_at: Option<Instant>,
     /// Whether it was seen initialised.
     initialized: bool,
+    /// Whether it is to greet after the death of an agent.
+    returning: bool,
     /// Whether the present delay was told.
     told: bool,
 }
@@ -39,6 +41,8 @@ pub(super) struct Life {
 enum Phase {
     /// The process runs; it has not greeted yet.
     Starting,
+    /// It outlived an agent, and has not greeted this one yet.
+    Returning,
     /// It was configured; `on_initialize` runs.
     Initializing,
     /// Beats are due, a few.
@@ -106,6 +110,7 @@ impl Life {
             order_since: now,
             unlinked_at: None,
             initialized: false,
+            returning: false,
             told: false,
         }
     }
@@ -119,6 +124,17 @@ impl Life {
             }
             HangLimit::Time(limit) => limit,
         };
+    }
+
+    /// It ran before this agent did, and greets soon.
+    pub(super) fn adopted(&mut self) {
+        self.phase = Phase::Returning;
+        self.returning = true;
+    }
+
+    /// Whether its first greeting after the death of an agent is still to come.
+    pub(super) fn is_returning(&self) -> bool {
+        self.returning
     }
 
     /// `configure` was sent.
@@ -175,6 +191,7 @@ impl Life {
 
     /// It connected, anew or at first.
     pub(super) fn linked(&mut self, now: Instant) {
+        self.returning = false;
         if self.unlinked_at.take().is_some() {
             self.told = false;
             self.restart_beats(now);
@@ -209,6 +226,7 @@ impl Life {
         match self.phase {
             Phase::Finishing | Phase::Terminating | Phase::Killed => true,
             Phase::Starting
+            | Phase::Returning
             | Phase::Initializing
             | Phase::Inactive
             | Phase::Active
@@ -250,6 +268,7 @@ impl Life {
         let patience = &self.patience;
         let (limit, what) = match self.phase {
             Phase::Starting => (patience.hello, What::Greeting),
+            Phase::Returning => (patience.reconnect, What::Greeting),
             Phase::Initializing => (patience.initialize, What::Initialized),
             Phase::Inactive | Phase::Active | Phase::Error if !self.orders.is_empty() => {
                 return self.sooner(self.wait_for_answer());
@@ -278,6 +297,7 @@ impl Life {
         let matters = match self.phase {
             Phase::Initializing | Phase::Inactive | Phase::Active | Phase::Error => true,
             Phase::Starting
+            | Phase::Returning
             | Phase::Finalized
             | Phase::Finishing
             | Phase::Terminating
@@ -302,6 +322,7 @@ impl Life {
         // News of a component that is being ended do not stop its end.
         let rank = |phase| match phase {
             Phase::Starting
+            | Phase::Returning
             | Phase::Initializing
             | Phase::Inactive
             | Phase::Active

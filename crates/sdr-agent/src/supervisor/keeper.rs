@@ -19,10 +19,11 @@ use tokio::net::UnixStream;
 use tokio::sync::mpsc;
 
 use super::instance::{Life, Overdue};
+use super::pidfd::End;
 use super::process::Process;
 use super::{Shared, samples, socket};
-use crate::clock;
 use crate::trouble::Kind;
+use crate::{clock, limits};
 
 /// Orders kept for a component that has not greeted yet.
 const PENDING_MAX: usize = 16;
@@ -80,11 +81,12 @@ impl Keeper {
         mut messages: mpsc::Receiver<Message>,
     ) {
         let instance = order.instance;
-        let started = Process::start(&shared.config, &order);
+        let started = Process::start((&shared.config, &shared.limiter), &order);
         match started {
             Ok(process) => {
                 let mut keeper = Self::new(Rc::clone(&shared), order, process);
-                keeper.announce().await;
+                let pid = keeper.announce();
+                shared.tell(instance, InstanceNews::Started { pid }).await;
                 keeper.watch(&mut messages).await;
                 keeper.bury().await;
             }
@@ -94,6 +96,20 @@ impl Keeper {
                 shared.tell(instance, InstanceNews::LaunchFailed { reason }).await;
             }
         }
+    }
+
+    /// Goes on with a process that an agent before this one started.
+    pub(super) fn adopt(shared: Rc<Shared>, order: LaunchOrder, process: Process) -> Self {
+        let mut keeper = Self::new(shared, order, process);
+        keeper.life.adopted();
+        keeper.announce();
+        keeper
+    }
+
+    /// Stays with what was adopted until it is gone.
+    pub(super) async fn stay(mut self, mut messages: mpsc::Receiver<Message>) {
+        self.watch(&mut messages).await;
+        self.bury().await;
     }
 
     fn new(shared: Rc<Shared>, order: LaunchOrder, process: Process) -> Self {
@@ -113,17 +129,18 @@ impl Keeper {
     }
 
     /// The process runs: everybody who watches processes gets to know it.
-    async fn announce(&self) {
+    fn announce(&self) -> u32 {
         let (instance, component) = (self.order.instance, &self.order.component);
         let pid = self.process.id();
         if let Some(kept) = self.shared.kept.borrow_mut().get_mut(&instance) {
             kept.pid = pid;
+            kept.badge.clone_from(&self.process.keepsake.badge);
         }
-        let program = &self.process.executable;
-        self.shared.journal.add(component.to_string(), instance, pid, program);
+        let Process { executable, keepsake, .. } = &self.process;
+        self.shared.journal.add(instance, pid, executable, keepsake);
         self.shared.outlets.watch.add(instance, pid, component);
         tracing::debug!(event = "started", %component, instance, pid);
-        self.shared.tell(instance, InstanceNews::Started { pid }).await;
+        pid
     }
 
     /// Until the process ends.
@@ -171,6 +188,8 @@ impl Keeper {
                 self.life.finish(now);
                 match self.link {
                     Some(_) => self.tell(Order::Finish).await,
+                    // It will greet in a moment, and be told then.
+                    None if self.life.is_returning() => {}
                     // Nobody is there to be asked.
                     None => self.terminate(now),
                 }
@@ -358,13 +377,34 @@ impl Keeper {
 
     /// Reaps the process and says how it ended.
     async fn bury(mut self) {
-        let reason = self.process.reap();
+        let (end, reason) = self.process.reap().await;
+        let was_out_of_memory = self.was_out_of_memory(end, &reason);
+        if let Some(group) = &self.process.keepsake.cgroup {
+            limits::dissolve(group);
+        }
         let instance = self.order.instance;
         tracing::debug!(event = "ended", component = %self.order.component, instance, reason);
         self.shared.kept.borrow_mut().remove(&instance);
         self.shared.journal.remove(instance);
         self.shared.outlets.watch.remove(instance, &self.shared.outlets.record);
-        self.shared.tell(instance, InstanceNews::Exited { reason }).await;
+        let news = match was_out_of_memory {
+            true => InstanceNews::OutOfMemory { reason },
+            false => InstanceNews::Exited { reason },
+        };
+        self.shared.tell(instance, news).await;
+    }
+
+    /// Whether the kernel, or its limit, took the memory away that it wanted.
+    fn was_out_of_memory(&self, end: Option<End>, reason: &str) -> bool {
+        let group = self.process.keepsake.cgroup.as_deref();
+        let of_group = group.is_some_and(limits::was_out_of_memory);
+        // One that we ended ourselves says nothing.
+        let by_kernel =
+            end == Some(End::Signal(9)) && !self.life.is_ending() && self.shared.oom.is_fresh();
+        let refused = self.order.spec.limits.memory.is_some()
+            && end != Some(End::Status(0))
+            && limits::says_refused(reason);
+        of_group || by_kernel || refused
     }
 }
 

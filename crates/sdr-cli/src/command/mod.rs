@@ -10,6 +10,7 @@ pub(crate) mod reset;
 pub(crate) mod role;
 pub(crate) mod sim;
 pub(crate) mod status;
+pub(crate) mod stop;
 pub(crate) mod undeploy;
 pub(crate) mod validate;
 

@@ -7,6 +7,8 @@
 
 mod agent;
 
+use std::time::Duration;
+
 use agent::{Agent, key, token};
 use sdr_component::message::{Encode, std_msgs::Int32};
 use sdr_component::protocol::{
@@ -295,6 +297,25 @@ fn a_component_outlives_its_agent_and_greets_the_next_one_with_what_it_knows() {
         _ => None,
     });
     assert_eq!(std::iter::from_fn(|| doubles.receive().unwrap()).count(), 2);
+}
+
+#[test]
+fn a_component_that_must_not_act_alone_deactivates_without_an_agent() {
+    let lease = Duration::from_millis(50);
+    let mut agent = Agent::new();
+    agent.lease = Some(lease);
+    let (_process, mut line) = agent.prepare(None, ExecutionSetup::OnData);
+    line.order(Order::Activate { token: token(1, 1) });
+    line.until_state(LifecycleState::Active);
+
+    // A busy machine may be late with its lease; it is never early.
+    let mut states = (1..=100).map(|times| {
+        agent.be_away(lease * times);
+        agent.greet().1.now
+    });
+    let last = states.find(|now| now.state != LifecycleState::Active).unwrap();
+
+    assert_eq!((last.state, last.token), (LifecycleState::Inactive, None));
 }
 
 #[test]

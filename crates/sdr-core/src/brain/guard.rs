@@ -134,6 +134,17 @@ impl Brain {
 
     /// Whether the time to follow a home has come, after asking others for news of it.
     fn is_due(&mut self, now: Instant, one: &Followed) -> bool {
+        if let Some(until) = self.held_until(now, &one.home) {
+            self.guard.suspects.remove(&one.home);
+            self.wake_guard(until);
+            return false;
+        }
+        // a planned restart of its agent: its components go on
+        if let Some(until) = self.held_until(now, &one.home) {
+            self.guard.suspects.remove(&one.home);
+            self.wake_guard(until);
+            return false;
+        }
         let age = self.mesh.age(&one.home, now).unwrap_or_else(|| now.since(self.started_at));
         let silent = age.min(now.since(self.guard.on_time_since));
         let pair = self.mesh.authors().count() <= 2;

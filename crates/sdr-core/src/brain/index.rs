@@ -191,6 +191,7 @@ impl Brain {
             | Input::Reset { .. }
             | Input::MoveRole { .. }
             | Input::RolePolicy { .. }
+            | Input::Hold { .. }
             | Input::Planned { .. }
             | Input::Stored { .. }
             | Input::StoreFailed { .. } => self.stir = Stir::ALL,

@@ -38,10 +38,20 @@ pub(super) enum Told {
     Finish,
 }
 
+/// Where a process comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Origin {
+    /// This agent started it.
+    Started,
+    /// It outlived the agent before; its state is known once it has greeted.
+    Adopted { pid: u32, greeted: bool },
+}
+
 /// One started process.
 #[derive(Clone, Debug)]
 pub(super) struct Instance {
     pub(super) component: ComponentKey,
+    pub(super) origin: Origin,
     /// Hash of its spec and wiring: another one needs another process.
     pub(super) shape: u64,
     /// The edition of its system that it was last found to fit.
@@ -67,6 +77,7 @@ impl Instance {
     pub(super) fn new(component: ComponentKey, shape: u64) -> Self {
         Self {
             component,
+            origin: Origin::Started,
             shape,
             fits: None,
             state: LifecycleState::Created,
@@ -89,6 +100,10 @@ impl Instance {
 
     pub(super) fn is_ending(&self) -> bool {
         self.told == Told::Finish
+    }
+
+    pub(super) fn is_adopted(&self) -> bool {
+        matches!(self.origin, Origin::Adopted { .. })
     }
 }
 
@@ -138,15 +153,23 @@ impl Brain {
     }
 
     pub(super) fn handle_instance(&mut self, now: Instant, id: InstanceId, news: InstanceNews) {
+        if let InstanceNews::Adopted(adoption) = news {
+            return self.take_over(id, *adoption);
+        }
         let Some(instance) = self.instances.get(&id) else { return };
         let key = instance.component.clone();
         match news {
+            InstanceNews::Adopted(_) => {}
             InstanceNews::Started { pid } => {
                 let event = Event::new("started", &self.me, format!("process {pid}")).about(&key);
                 self.push_event(event.number("pid", f64::from(pid)));
             }
             InstanceNews::LaunchFailed { reason } => self.lose(id, &key, Cause::Exited, reason),
             InstanceNews::Exited { reason } => self.lose(id, &key, Cause::Exited, reason),
+            InstanceNews::OutOfMemory { reason } => {
+                self.event_about("out-of-memory", &key, reason.clone());
+                self.lose(id, &key, Cause::Exited, reason);
+            }
             InstanceNews::Hung { .. } if instance.is_ending() => self.kill_again(id),
             InstanceNews::Hung { reason } => {
                 self.event_about("hung", &key, reason.clone());
@@ -174,15 +197,22 @@ impl Brain {
     ) {
         let Some(instance) = self.instances.get_mut(&id) else { return };
         let changed = instance.state != state || instance.token != token;
+        let acted =
+            matches!(&instance.told, Told::Activate(told) if Some(told) == instance.token.as_ref());
+        if acted && state == LifecycleState::Inactive {
+            // it stopped by itself, without an agent for too long: what it was told is over
+            instance.told = Told::Nothing;
+        }
         instance.state = state;
         instance.token.clone_from(&token);
-        if state == LifecycleState::Inactive {
+        if matches!(state, LifecycleState::Inactive | LifecycleState::Active) {
             instance.inactive_at.get_or_insert(now);
         }
+        let key = instance.component.clone();
+        self.welcome(id);
         if !changed {
             return;
         }
-        let key = instance.component.clone();
         let kind = match state {
             LifecycleState::Created => "created",
             LifecycleState::Inactive => "inactive",

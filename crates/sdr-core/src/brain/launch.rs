@@ -123,7 +123,7 @@ impl Brain {
 }
 
 /// Hash of what a process is started with; the place in the file does not matter.
-fn shape_hash(spec: &ComponentSpec, inputs: &[InputWiring]) -> u64 {
+pub(super) fn shape_hash(spec: &ComponentSpec, inputs: &[InputWiring]) -> u64 {
     let mut spec = spec.clone();
     spec.index = 0;
     let bytes = postcard::to_allocvec(&(spec, inputs)).expect("writing plain data cannot fail");

@@ -10,6 +10,7 @@
 //! `decide` acts only on the coordinator, and only mints records; every robot `reconcile`s
 //! what should be on itself with what is. Nothing is ever told to another robot but records.
 
+mod adopt;
 mod conditions;
 mod config;
 mod deadlines;
@@ -22,6 +23,7 @@ mod fitness;
 mod gone;
 mod guard;
 mod handover;
+mod hold;
 mod index;
 mod instances;
 mod isolation;
@@ -76,6 +78,7 @@ use crate::{
 };
 use epochs::EpochBook;
 use guard::GuardDesk;
+use hold::Holds;
 use index::{Index, Stir};
 use instances::{Instance, RunBook};
 use isolation::Lease;
@@ -165,6 +168,7 @@ pub struct Brain {
     desk: Desk,
     desk_of_role: RoleDesk,
     lease: Lease,
+    holds: Holds,
     duplicates_told: BTreeSet<core::net::SocketAddr>,
 }
 
@@ -246,6 +250,7 @@ impl Brain {
             desk: Desk::default(),
             desk_of_role: RoleDesk::default(),
             lease: Lease::default(),
+            holds: Holds::default(),
             duplicates_told: BTreeSet::new(),
         });
         brain.read_latches();
@@ -285,6 +290,7 @@ impl Brain {
             Input::MoveRole { request, to } => self.handle_move_role(request, &to),
             Input::RolePolicy { request, policy } => self.handle_role_policy(request, *policy),
             Input::Told { question, result } => self.handle_told(now, question, result),
+            Input::Hold { time } => self.announce_hold(time),
             Input::Planned { plan, result } => self.handle_planned(now, plan, result),
             Input::Stored { ticket } => self.handle_stored(ticket),
             Input::StoreFailed { ticket, reason } => self.handle_store_failed(ticket, &reason),

@@ -19,7 +19,10 @@ impl Brain {
         let mut changed = Changed::default();
         while let Some(news) = self.mesh.poll_news() {
             match news {
-                MeshNews::Report(robot, spoken) => self.note_report(robot, &spoken),
+                MeshNews::Report(robot, spoken) => {
+                    self.note_hold(now, &robot);
+                    self.note_report(robot, &spoken);
+                }
                 MeshNews::Record(key) => {
                     self.desk.mark_dirty();
                     self.stir.fleet = true;

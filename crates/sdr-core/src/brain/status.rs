@@ -58,6 +58,7 @@ impl Brain {
                     | Report::Link(..)
                     | Report::Instance(_)
                     | Report::Succession(_)
+                    | Report::Hold(_)
                     | Report::Homeless(_) => None,
                 })
                 .collect(),
@@ -149,6 +150,7 @@ impl Brain {
             Report::Homeless(homeless) if homeless.component == *key => Some(&homeless.refusals),
             Report::Homeless(_)
             | Report::Succession(_)
+            | Report::Hold(_)
             | Report::Facts(_)
             | Report::Host(_)
             | Report::Link(..)

@@ -134,7 +134,7 @@ table! {
         tries: Option<At<NonZeroU8>>,
         /// Quiet time that counts as healed; default 10s.
         settle: Option<At<Duration>>,
-        /// Pause before each try, doubling: default 200ms..5s.
+        /// Pause before each try but the first, doubling: default 200ms..5s.
         backoff: Option<At<Backoff>>,
     }
 }

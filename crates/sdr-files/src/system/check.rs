@@ -19,6 +19,7 @@ use super::{
         ComponentTable, DefaultsTable, NeedsTable, OnData, PlaceTable, Rate, StandbyTable,
         SystemFile,
     },
+    limits::limits,
     order::{check_names, check_start_order},
     policies::{OwnRules, policies},
 };
@@ -172,6 +173,7 @@ fn component(
         on_isolation.action = given.value.action;
         on_isolation.after = given.value.after.unwrap_or(ISOLATED_AFTER);
     }
+    let limits = table.limits.map(|table| limits(table, reader)).unwrap_or_default();
     let (parameters, parameter_marks) = parameters(table.parameters, reader);
     let list = |given: Option<At<Vec<At<Name>>>>| -> Vec<Name> {
         given.map(|list| list.value.into_iter().map(|at| at.value).collect()).unwrap_or_default()
@@ -195,6 +197,8 @@ fn component(
         on_isolation,
         standby,
         parameters,
+        on_agent_death: table.on_agent_death.map(|at| at.value),
+        limits,
     };
     Some((component, places))
 }

@@ -40,6 +40,7 @@ mod shell;
 mod shrink;
 mod sight;
 mod story;
+mod survive;
 pub mod systems;
 mod tally;
 mod trace;

@@ -151,6 +151,15 @@ impl Robot {
         std::mem::take(&mut self.processes)
     }
 
+    /// Its agent is gone, and the routes between robots with it.
+    pub(crate) fn leave_processes(&mut self) {
+        self.brain = None;
+        self.life += 1;
+        self.outs.clear();
+        self.ins.clear();
+        self.crash_at_store = None;
+    }
+
     /// Whether its agent runs.
     pub fn is_on(&self) -> bool {
         self.brain.is_some()
@@ -239,7 +248,7 @@ impl Robot {
 
     /// What one of its processes takes.
     pub(crate) fn usage(&self, process: &Process) -> Usage {
-        let declared = Usage { memory: process.needs.memory, cpu: process.needs.cpu };
+        let declared = Usage { memory: process.spec.needs.memory, cpu: process.spec.needs.cpu };
         self.takes.unwrap_or(declared)
     }
 

@@ -149,7 +149,7 @@ impl Fleet {
         let process = Process {
             component: order.component,
             number: component,
-            needs: order.spec.needs,
+            spec: order.spec,
             hung: false,
             inputs,
             state: LifecycleState::Created,
