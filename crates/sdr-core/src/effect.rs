@@ -146,9 +146,10 @@ pub struct Route {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Local producer, remote consumers: forward samples that carry this token; none while
-    /// there is no active instance here (endpoints exist and are matched already).
+    /// there is no active instance here or no consumer runs elsewhere (endpoints exist and are
+    /// matched already).
     Out {
-        /// The token of the local active instance.
+        /// The token of the local active instance, when somebody elsewhere wants its samples.
         active: Option<Token>,
     },
     /// Remote producer, local consumers.

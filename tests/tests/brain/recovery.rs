@@ -65,6 +65,24 @@ fn the_next_home_is_ready_when_the_time_of_a_condition_is_over() {
 }
 
 #[test]
+fn a_prepared_target_is_connected_and_sent_nothing_until_it_is_home() {
+    let mut fleet = deployed(23);
+    assert_eq!(fleet.robots[0].sends("exploration/fisheye/image"), None);
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "prepared", |fleet| fleet.robots[2].processes().count() == 3);
+    fleet.run(Duration::from_secs(1));
+
+    let story = fleet.story();
+    assert_eq!(fleet.events("condition-raised"), [], "{story}");
+    assert_eq!(fleet.robots[0].sends("exploration/fisheye/image"), Some(false), "{story}");
+    assert_eq!(fleet.robots[0].sends("exploration/anomaly/danger"), Some(true), "{story}");
+    fleet.run_until(LONG, "sent to the new home", |fleet| {
+        fleet.robots[0].sends("exploration/fisheye/image") == Some(true)
+    });
+    fleet.run_until(LONG, "moved", |fleet| fleet.events("moved").len() == 2);
+}
+
+#[test]
 fn what_was_foreseen_and_did_not_come_is_taken_back_without_a_move() {
     let mut fleet = deployed(22);
     fleet.set_rssi(0, -55.0);

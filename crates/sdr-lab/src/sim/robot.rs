@@ -285,6 +285,12 @@ impl Robot {
         changed
     }
 
+    /// Whether samples of a port (`system/component/port`) leave this robot; `None` when it is
+    /// not even connected to others.
+    pub fn sends(&self, path: &str) -> Option<bool> {
+        self.outs.get(path).map(Option::is_some)
+    }
+
     /// Whether a process of this component is active here.
     pub fn has_active(&self, word: &str) -> bool {
         self.processes.values().any(|process| {
