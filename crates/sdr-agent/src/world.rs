@@ -324,6 +324,7 @@ fn start_senses(robot: &RobotConfig, outlets: Outlets) -> Result<(Metrics, Data)
     let data_config = DataConfig {
         robot: robot.name.clone(),
         domain_id: robot.ros.domain_id,
+        addresses: robot.ros.addresses.clone(),
         memory: config::shared_memory(robot),
     };
     let data = Data::start(data_config, inputs, taps::sink(types, record, listeners))?;

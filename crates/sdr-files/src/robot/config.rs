@@ -1,6 +1,11 @@
 //! robot.toml after all checks.
 
-use std::{fmt, net::SocketAddr, path::PathBuf, time::Duration};
+use std::{
+    fmt,
+    net::{Ipv4Addr, SocketAddr},
+    path::PathBuf,
+    time::Duration,
+};
 
 use sdr_core::{
     id::{Name, RobotId},
@@ -137,10 +142,12 @@ pub enum Cgroup {
 }
 
 /// ROS 2.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RosConfig {
     /// DDS domain, 0..=232.
     pub domain_id: u16,
+    /// The addresses by which samples cross; empty: all that the robot has.
+    pub addresses: Vec<Ipv4Addr>,
 }
 
 /// The API.

@@ -147,6 +147,8 @@ table! {
     pub(crate) struct RosTable {
         /// DDS domain, 0 to 232; default 0.
         domain_id: Option<At<u16>>,
+        /// IPv4 addresses of this robot by which samples cross; default: all it has.
+        addresses: Option<At<Vec<At<String>>>>,
     }
     later {
         static_peers: "unicast ROS 2 machines",

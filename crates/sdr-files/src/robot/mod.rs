@@ -7,6 +7,7 @@ mod config;
 mod file;
 mod mesh;
 mod places;
+mod ros;
 mod sources;
 
 use std::path::Path;

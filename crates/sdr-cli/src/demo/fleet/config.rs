@@ -82,6 +82,7 @@ path = [{programs}]
 on_agent_death = "stop"
 [ros]
 domain_id = {domain}
+addresses = ["127.0.0.1"]
 [coordinator]
 preference = "{preference}"
 [api]
