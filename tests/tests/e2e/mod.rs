@@ -4,6 +4,7 @@ mod by_hand;
 mod demo;
 mod garbage;
 mod keys;
+mod lab;
 mod life;
 mod limits;
 mod role;
