@@ -95,6 +95,7 @@ impl Brain {
             return;
         };
         let (component, latched) = (latch.component.clone(), latch.latched);
+        self.stir.here |= self.index.touches(&component.system);
         if latched {
             self.latches.insert(component, latch.reason.clone());
             return;

@@ -8,6 +8,7 @@ use crate::{
     input::InstanceId,
     mesh::{MeshNews, Spoken},
     planted::{self, Defect},
+    record::RecordKind,
     time::Instant,
 };
 
@@ -26,6 +27,8 @@ impl Brain {
                 MeshNews::Record(key) => {
                     self.desk.mark_dirty();
                     self.stir.fleet = true;
+                    // beats from here follow the coordinator
+                    self.stir.here |= key.kind == RecordKind::ROLE;
                     self.note_home(now, &key);
                     changed.note(&key);
                     self.take_latch(&key);
@@ -77,6 +80,8 @@ impl Brain {
         self.stir.fleet |=
             spoken.facts || spoken.conditions || (moves && !spoken.components.is_empty());
         self.stir.here |= spoken.components.iter().any(|key| self.index.touches(&key.system));
+        // beats from here go to those who follow the coordinator, too
+        self.stir.here |= spoken.succession && self.is_holder(&robot);
         if spoken.conditions {
             self.index.troubled.insert(robot);
         }

@@ -54,6 +54,11 @@ impl Brain {
         !self.desk_of_role.suspended && self.role().is_some_and(|role| role.holder == self.me)
     }
 
+    /// Whether `robot` holds the role, as far as is known here.
+    pub(super) fn is_holder(&self, robot: &RobotId) -> bool {
+        self.role().is_some_and(|role| role.holder == *robot)
+    }
+
     pub(super) fn consider_role(&mut self, now: Instant) {
         if self.desk_of_role.wake_at.is_some_and(|at| now >= at) {
             self.desk_of_role.wake_at = None;

@@ -111,6 +111,8 @@ pub struct Spoken {
     pub facts: bool,
     /// Its trouble.
     pub conditions: bool,
+    /// Who follows it in the coordinator role.
+    pub succession: bool,
     /// Its instances of these components.
     pub components: Vec<ComponentKey>,
 }
@@ -121,13 +123,8 @@ impl Spoken {
             Some(Report::Facts(_)) => self.facts = true,
             Some(Report::Instance(instance)) => self.components.push(instance.component.clone()),
             Some(Report::Condition(_)) => self.conditions = true,
-            Some(
-                Report::Host(_)
-                | Report::Link(..)
-                | Report::Succession(_)
-                | Report::Homeless(_)
-                | Report::Hold(_),
-            )
+            Some(Report::Succession(_)) => self.succession = true,
+            Some(Report::Host(_) | Report::Link(..) | Report::Homeless(_) | Report::Hold(_))
             | None => {}
         }
     }
