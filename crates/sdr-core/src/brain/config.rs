@@ -4,7 +4,12 @@ use alloc::{boxed::Box, string::String, sync::Arc, vec::Vec};
 use core::{fmt, net::SocketAddr, time::Duration};
 
 use crate::{
-    fitness::RolePolicy, id::RobotId, mesh::Commons, recover::Recovery, report::RobotFacts,
+    fitness::RolePolicy,
+    id::RobotId,
+    mesh::{Commons, MeshConfig},
+    order::hash64,
+    recover::Recovery,
+    report::RobotFacts,
     spec::PolicyBytes,
 };
 
@@ -59,6 +64,18 @@ impl BrainConfig {
 }
 
 impl BrainConfig {
+    /// What concerns the mesh.
+    pub(super) fn of_mesh(&self) -> MeshConfig {
+        MeshConfig {
+            robot: self.robot.clone(),
+            fleet: u32::try_from(hash64(self.fleet.as_bytes()) & 0xffff_ffff).unwrap_or(0),
+            seeds: self.seeds.clone(),
+            listen: self.listen,
+            period: self.gossip_period,
+            gone_after: self.gone_after,
+        }
+    }
+
     /// How many addresses to begin with are not this robot's own.
     pub(super) fn seeds_of_others(&self) -> usize {
         self.seeds.iter().filter(|seed| Some(**seed) != self.listen).count()

@@ -69,8 +69,7 @@ use crate::{
     effect::{Effect, StoredState},
     id::{ComponentKey, Name, RobotId},
     input::{Input, InstanceId},
-    mesh::{FleetTable, Incarnation, Mesh, MeshConfig},
-    order::hash64,
+    mesh::{FleetTable, Incarnation, Mesh},
     planted::{self, Defect},
     recover::{Cause, Fault},
     report::{ConditionReport, HostReport},
@@ -187,16 +186,8 @@ impl Brain {
         let counter = if lives == 0 { 0 } else { lives.saturating_add(1) };
         let stored = stored.unwrap_or_default();
         let own = Incarnation { counter, nonce: u32::try_from(config.seed >> 32).unwrap_or(0) };
-        let mesh_config = MeshConfig {
-            robot: config.robot.clone(),
-            fleet: u32::try_from(hash64(config.fleet.as_bytes()) & 0xffff_ffff).unwrap_or(0),
-            seeds: config.seeds.clone(),
-            listen: config.listen,
-            period: config.gossip_period,
-            gone_after: config.gone_after,
-        };
         let fleet = FleetTable::new(&stored.fleet, seams.commons.clone());
-        let mesh = Mesh::new(mesh_config, own, fleet, &stored.peers, now);
+        let mesh = Mesh::new(config.of_mesh(), own, fleet, &stored.peers, now);
         let runs = stored.runs.into_iter().filter(|_| !planted::is(Defect::RunNotReserved));
         let runs = runs.map(|(key, run)| (key, RunBook::from_disk(run)));
         let epochs = stored.epochs.into_iter();
