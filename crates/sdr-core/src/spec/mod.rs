@@ -21,7 +21,7 @@ pub use component::{
     StandbyKind, StandbyWhere,
 };
 pub use connection::{ConnectionSpec, PortRef, Qos, Reliability, port_path};
-pub use value::Value;
+pub use value::{LISTS_DEEP_MAX, Value};
 
 /// A policy as its crate encoded it; the core only carries it.
 ///

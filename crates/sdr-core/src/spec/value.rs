@@ -1,13 +1,19 @@
 //! Parameter values.
 
+mod read;
+
 use alloc::{string::String, vec::Vec};
 use core::fmt;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Serialize, Serializer};
+
+/// How deep lists may stand in each other: whoever reads them needs a bounded stack.
+pub const LISTS_DEEP_MAX: usize = 16;
 
 /// A parameter's value: what both YAML and ROS 2 parameters can say.
 ///
-/// In JSON and YAML it is the bare value; on the mesh it carries its kind.
+/// In JSON and YAML it is the bare value; on the mesh it carries its kind. Lists stand at most
+/// [`LISTS_DEEP_MAX`] deep in each other.
 #[derive(Clone, Debug)]
 pub enum Value {
     /// `true` or `false`.
@@ -82,49 +88,14 @@ impl fmt::Display for Value {
     }
 }
 
-/// As people write it: no tags.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Bare {
-    Bool(bool),
-    Int(i64),
-    Float(f64),
-    Text(String),
-    List(Vec<Value>),
-}
-
 /// As the mesh carries it: tagged.
-#[derive(Serialize, Deserialize)]
-enum Tagged {
+#[derive(Serialize)]
+enum Tagged<'a> {
     Bool(bool),
     Int(i64),
     Float(f64),
-    Text(String),
-    List(Vec<Value>),
-}
-
-impl From<Bare> for Value {
-    fn from(bare: Bare) -> Self {
-        match bare {
-            Bare::Bool(flag) => Self::Bool(flag),
-            Bare::Int(whole) => Self::Int(whole),
-            Bare::Float(number) => Self::Float(number),
-            Bare::Text(text) => Self::Text(text),
-            Bare::List(items) => Self::List(items),
-        }
-    }
-}
-
-impl From<Tagged> for Value {
-    fn from(tagged: Tagged) -> Self {
-        match tagged {
-            Tagged::Bool(flag) => Self::Bool(flag),
-            Tagged::Int(whole) => Self::Int(whole),
-            Tagged::Float(number) => Self::Float(number),
-            Tagged::Text(text) => Self::Text(text),
-            Tagged::List(items) => Self::List(items),
-        }
-    }
+    Text(&'a str),
+    List(&'a [Value]),
 }
 
 impl Serialize for Value {
@@ -138,24 +109,14 @@ impl Serialize for Value {
                 Self::List(items) => items.serialize(serializer),
             }
         } else {
-            let tagged = match self.clone() {
-                Self::Bool(flag) => Tagged::Bool(flag),
-                Self::Int(whole) => Tagged::Int(whole),
-                Self::Float(number) => Tagged::Float(number),
+            let tagged = match self {
+                Self::Bool(flag) => Tagged::Bool(*flag),
+                Self::Int(whole) => Tagged::Int(*whole),
+                Self::Float(number) => Tagged::Float(*number),
                 Self::Text(text) => Tagged::Text(text),
                 Self::List(items) => Tagged::List(items),
             };
             tagged.serialize(serializer)
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for Value {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        if deserializer.is_human_readable() {
-            Bare::deserialize(deserializer).map(Self::from)
-        } else {
-            Tagged::deserialize(deserializer).map(Self::from)
         }
     }
 }
