@@ -33,7 +33,10 @@ pub mod schema;
 mod system;
 
 pub use kind::{FileKind, LoadedFile, detect, load_any};
-pub use policy::{load_allocation, load_recovery, load_role, role_text};
+pub use policy::{
+    load_allocation, load_recovery, load_role, parse_allocation, parse_recovery, parse_role,
+    role_text,
+};
 pub use problem::{Problem, Problems};
 pub use robot::{RobotConfig, load_robot};
 pub use system::{LoadedSystem, link_profiles, load_system, parse_system};

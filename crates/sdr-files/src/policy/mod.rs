@@ -45,5 +45,25 @@ pub fn load_role(path: &Path) -> Result<RolePolicy, Problems> {
     find::load::<RoleFile>(Source::load(path)?, &Finder::beside(path))
 }
 
+/// As [`load_allocation`] for a text; `file` names it in problems, others are looked up from
+/// `folder`.
+pub fn parse_allocation(
+    file: &str,
+    text: &str,
+    folder: &Path,
+) -> Result<AllocationPolicy, Problems> {
+    find::load::<AllocationFile>(Source::new(file, text), &Finder::from(folder))
+}
+
+/// As [`load_recovery`] for a text.
+pub fn parse_recovery(file: &str, text: &str, folder: &Path) -> Result<RecoveryPolicy, Problems> {
+    find::load::<RecoveryFile>(Source::new(file, text), &Finder::from(folder))
+}
+
+/// As [`load_role`] for a text.
+pub fn parse_role(file: &str, text: &str, folder: &Path) -> Result<RolePolicy, Problems> {
+    find::load::<RoleFile>(Source::new(file, text), &Finder::from(folder))
+}
+
 #[cfg(test)]
 mod tests;
