@@ -7,9 +7,12 @@ use std::path::PathBuf;
 use rand::TryRngCore as _;
 use rand::rngs::OsRng;
 use sdr_component::protocol::SharedMemory;
-use sdr_core::{brain::BrainConfig, order::hash64, report::RobotFacts, units::Bytes};
+use sdr_core::{
+    blob::PART_BYTES_MAX, brain::BrainConfig, order::hash64, record::RECORD_BYTES_MAX,
+    report::RobotFacts, units::Bytes,
+};
 use sdr_files::RobotConfig;
-use sdr_files::robot::{BatterySource, PositionSource, RssiSource};
+use sdr_files::robot::{BatterySource, PositionSource, RssiSource, Seal};
 
 use crate::installed;
 use crate::metrics::{MetricsConfig, Radio, Sensors, Source, host};
@@ -43,6 +46,11 @@ pub(crate) fn memory_capacity(config: &RobotConfig) -> Bytes {
     config.capacity.memory.unwrap_or_else(of_machine)
 }
 
+/// The fleet's name; `of_keys` is the one that keys name.
+pub(crate) fn fleet(config: &RobotConfig, of_keys: Option<&str>) -> String {
+    of_keys.or(config.mesh.fleet.as_deref()).unwrap_or("fleet").into()
+}
+
 /// The brain's, but for where the mesh listens; `fleet` is the one that keys name.
 pub(crate) fn brain(config: &RobotConfig, fleet: Option<&str>) -> BrainConfig {
     let facts = RobotFacts {
@@ -56,12 +64,17 @@ pub(crate) fn brain(config: &RobotConfig, fleet: Option<&str>) -> BrainConfig {
         version: env!("CARGO_PKG_VERSION").into(),
     };
     BrainConfig {
-        fleet: fleet.or(config.mesh.fleet.as_deref()).unwrap_or("fleet").into(),
+        fleet: self::fleet(config, fleet),
         seeds: config.mesh.seeds.clone(),
         seed: OsRng.try_next_u64().expect("the kernel always has randomness after boot"),
         gossip_period: config.mesh.gossip_period,
         gone_after: config.mesh.gone_after,
         rejoin_wait: config.mesh.rejoin_wait,
+        part_bytes_max: match config.mesh.seal {
+            Seal::Keys(_) => PART_BYTES_MAX,
+            // blobs travel over sealed streams alone
+            Seal::Plain => RECORD_BYTES_MAX,
+        },
         ..BrainConfig::new(config.name.clone(), facts)
     }
 }

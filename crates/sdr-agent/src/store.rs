@@ -1,8 +1,5 @@
 //! What the brain must not forget, on disk: replaced as a whole, checked when read.
-//!
-//! ```text
-//!  "SDRSTATE" | version u32 | checksum u64 of the rest | StoredState in postcard
-//! ```
+//! [`sdr_core::disk`] has the bytes.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -11,18 +8,16 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use sdr_core::{
+    blob::Blob,
+    disk::{self, StateError},
     effect::StoredState,
     input::{Input, StoreTicket},
-    order::hash64,
 };
-use thiserror::Error;
 use tokio::sync::mpsc;
 
+use crate::blobs::BlobStore;
 use crate::events::Events;
 
-const MAGIC: &[u8; 8] = b"SDRSTATE";
-const VERSION: u32 = 1;
-const HEADER_BYTES: usize = 20;
 const FILE_NAME: &str = "state";
 
 /// What the disk held at the start.
@@ -41,34 +36,6 @@ pub(crate) enum Remembered {
     },
 }
 
-/// Why bytes are not a state. Nothing was changed; the operator may look at the file.
-#[derive(Debug, Error)]
-pub(crate) enum StateError {
-    /// Not written by an agent.
-    #[error("{found} bytes that do not begin with the state's mark")]
-    Foreign {
-        /// Length of the file.
-        found: usize,
-    },
-    /// Written by another version.
-    #[error("version {found}; this agent reads version {VERSION}")]
-    Version {
-        /// The version it says.
-        found: u32,
-    },
-    /// Torn or flipped.
-    #[error("checksum {found:016x}, the content has {expected:016x}")]
-    Checksum {
-        /// The checksum it says.
-        found: u64,
-        /// The checksum of what is there.
-        expected: u64,
-    },
-    /// Whole, yet no state.
-    #[error("content cannot be read: {0}")]
-    Content(postcard::Error),
-}
-
 /// Writes states on a thread of its own; the newest order replaces those still waiting.
 #[derive(Debug)]
 pub(crate) struct Store {
@@ -82,9 +49,17 @@ struct Slot {
     changed: Condvar,
 }
 
+/// One order: parts first, then the state that names them.
+#[derive(Debug)]
+struct Order {
+    ticket: StoreTicket,
+    state: StoredState,
+    blobs: Vec<Blob>,
+}
+
 #[derive(Debug, Default)]
 struct Waiting {
-    order: Option<(StoreTicket, StoredState)>,
+    order: Option<Order>,
     closed: bool,
 }
 
@@ -92,19 +67,21 @@ impl Store {
     /// Starts the writer for the folder `dir`; outcomes go to `inputs`.
     pub(crate) fn start(
         dir: PathBuf,
+        parts: BlobStore,
         inputs: mpsc::Sender<Input>,
         events: Events,
     ) -> io::Result<Self> {
         let slot = Arc::new(Slot::default());
-        let desk = Desk { slot: Arc::clone(&slot), dir, inputs, events, failing: false };
+        let slot_of_desk = Arc::clone(&slot);
+        let desk = Desk { slot: slot_of_desk, dir, parts, inputs, events, failing: false };
         let writer = thread::Builder::new().name("store".into()).spawn(move || desk.run())?;
         Ok(Self { slot, writer: Some(writer) })
     }
 
     /// Orders `state` to be written; its outcome answers all orders before it as well.
-    pub(crate) fn put(&self, ticket: StoreTicket, state: StoredState) {
+    pub(crate) fn put(&self, ticket: StoreTicket, state: StoredState, blobs: Vec<Blob>) {
         let mut waiting = self.slot.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        waiting.order = Some((ticket, state));
+        waiting.order = Some(Order { ticket, state, blobs });
         self.slot.changed.notify_one();
     }
 }
@@ -125,6 +102,7 @@ impl Drop for Store {
 struct Desk {
     slot: Arc<Slot>,
     dir: PathBuf,
+    parts: BlobStore,
     inputs: mpsc::Sender<Input>,
     events: Events,
     failing: bool,
@@ -132,14 +110,13 @@ struct Desk {
 
 impl Desk {
     fn run(mut self) {
-        while let Some((ticket, state)) = self.slot.take() {
-            let outcome = match write(&self.dir, &state) {
+        while let Some(Order { ticket, state, blobs }) = self.slot.take() {
+            let outcome = match self.write(&state, &blobs) {
                 Ok(()) => {
                     self.turn(false, "the state reaches the disk again");
                     Input::Stored { ticket }
                 }
-                Err(error) => {
-                    let reason = format!("{}: {error}", self.dir.join(FILE_NAME).display());
+                Err(reason) => {
                     self.turn(true, &reason);
                     Input::StoreFailed { ticket, reason }
                 }
@@ -149,6 +126,17 @@ impl Desk {
                 return;
             }
         }
+    }
+
+    /// What the state names is there before it, and goes after it.
+    fn write(&self, state: &StoredState, blobs: &[Blob]) -> Result<(), String> {
+        self.parts.keep_parts(blobs).map_err(|error| error.to_string())?;
+        let file = self.dir.join(FILE_NAME);
+        write(&self.dir, state).map_err(|error| format!("{}: {error}", file.display()))?;
+        if let Err(error) = self.parts.sweep_parts(&state.blobs().collect()) {
+            tracing::warn!(event = "parts-unswept", %error, next = "with the next state");
+        }
+        Ok(())
     }
 
     /// Says that the disk began to fail, or to work again; not each time.
@@ -163,7 +151,7 @@ impl Desk {
 
 impl Slot {
     /// Waits for an order; `None` once closed and empty.
-    fn take(&self) -> Option<(StoreTicket, StoredState)> {
+    fn take(&self) -> Option<Order> {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
             if let Some(order) = waiting.order.take() {
@@ -186,7 +174,7 @@ pub(crate) fn read(dir: &Path) -> io::Result<Remembered> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Remembered::Nothing),
         Err(error) => return Err(error),
     };
-    match decode(&bytes) {
+    match disk::decode(&bytes) {
         Ok(state) => Ok(Remembered::State(state)),
         Err(reason) => {
             let set_aside = free_name(dir);
@@ -210,36 +198,10 @@ fn free_name(dir: &Path) -> PathBuf {
 fn write(dir: &Path, state: &StoredState) -> io::Result<()> {
     let temporary = dir.join("state.new");
     let mut file = File::create(&temporary)?;
-    file.write_all(&encode(state).map_err(io::Error::other)?)?;
+    file.write_all(&disk::encode(state))?;
     file.sync_all()?;
     fs::rename(&temporary, dir.join(FILE_NAME))?;
     File::open(dir)?.sync_all()
-}
-
-fn encode(state: &StoredState) -> Result<Vec<u8>, postcard::Error> {
-    let content = postcard::to_allocvec(state)?;
-    let mut bytes = Vec::with_capacity(HEADER_BYTES + content.len());
-    bytes.extend_from_slice(MAGIC);
-    bytes.extend_from_slice(&VERSION.to_le_bytes());
-    bytes.extend_from_slice(&hash64(&content).to_le_bytes());
-    bytes.extend_from_slice(&content);
-    Ok(bytes)
-}
-
-fn decode(bytes: &[u8]) -> Result<StoredState, StateError> {
-    let foreign = StateError::Foreign { found: bytes.len() };
-    let Some(rest) = bytes.strip_prefix(MAGIC) else { return Err(foreign) };
-    let Some((version, rest)) = rest.split_first_chunk::<4>() else { return Err(foreign) };
-    let Some((checksum, content)) = rest.split_first_chunk::<8>() else { return Err(foreign) };
-    let version = u32::from_le_bytes(*version);
-    if version != VERSION {
-        return Err(StateError::Version { found: version });
-    }
-    let (found, expected) = (u64::from_le_bytes(*checksum), hash64(content));
-    if found != expected {
-        return Err(StateError::Checksum { found, expected });
-    }
-    postcard::from_bytes(content).map_err(StateError::Content)
 }
 
 #[cfg(test)]
@@ -248,6 +210,10 @@ mod tests {
 
     fn events() -> Events {
         Events::new(sdr_core::id::RobotId::new("robot-1").unwrap())
+    }
+
+    fn parts(dir: &Path) -> BlobStore {
+        BlobStore::open(dir, 1 << 20).unwrap()
     }
 
     fn state(incarnation: u64) -> StoredState {
@@ -259,9 +225,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let (inputs, mut outcomes) = mpsc::channel(64);
 
-        let store = Store::start(dir.path().into(), inputs, events()).unwrap();
+        let store = Store::start(dir.path().into(), parts(dir.path()), inputs, events()).unwrap();
         for ticket in 1..=20 {
-            store.put(ticket, state(ticket));
+            store.put(ticket, state(ticket), Vec::new());
         }
         drop(store);
 
@@ -280,7 +246,7 @@ mod tests {
     fn a_corrupt_state_is_set_aside_and_the_agent_starts_empty() {
         let dir = tempfile::tempdir().unwrap();
         for (number, spoil) in [(1, 25_usize), (2, 9), (3, 0)] {
-            let mut bytes = encode(&StoredState { incarnation: 300, ..state(0) }).unwrap();
+            let mut bytes = disk::encode(&StoredState { incarnation: 300, ..state(0) });
             let at = spoil.min(bytes.len() - 1);
             bytes[at] ^= 0x40;
             fs::write(dir.path().join(FILE_NAME), &bytes).unwrap();
@@ -295,14 +261,6 @@ mod tests {
     }
 
     #[test]
-    fn every_truncation_is_seen() {
-        let bytes = encode(&StoredState { incarnation: 1 << 40, ..state(0) }).unwrap();
-        for length in 0..bytes.len() {
-            assert!(decode(&bytes[..length]).is_err(), "{length} of {} bytes", bytes.len());
-        }
-    }
-
-    #[test]
     fn a_disk_that_refuses_is_reported_with_the_ticket() {
         let dir = tempfile::tempdir().unwrap();
         let gone = dir.path().join("gone");
@@ -310,8 +268,8 @@ mod tests {
 
         let events = events();
 
-        let store = Store::start(gone, inputs, events.clone()).unwrap();
-        store.put(7, state(1));
+        let store = Store::start(gone, parts(dir.path()), inputs, events.clone()).unwrap();
+        store.put(7, state(1), Vec::new());
         drop(store);
 
         let outcome = outcomes.try_recv().unwrap();

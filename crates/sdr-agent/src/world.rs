@@ -18,12 +18,13 @@ use thiserror::Error;
 use tokio::sync::mpsc;
 
 use crate::api::{self, AnswerDesk, Api, ApiError, ApiState, LatestPlan, Profiles, Question};
-use crate::blobs::{BlobStore, StoreError, Streams, StreamsError};
+use crate::blobs::{BlobStore, Parts, StoreError, Streams, StreamsError};
 use crate::data::{Data, DataConfig, DataError};
 use crate::effects::Effects;
 use crate::events::Events;
 use crate::installed::Installed;
 use crate::mesh::{
+    discovery::Discovery,
     keys::{FleetKeys, KeysRefused},
     sealed::Sidings,
     udp::Mesh,
@@ -133,9 +134,12 @@ impl World {
 
         let keys = FleetKeys::open(robot, &ground.events, &trouble)?;
         let remote = api::open_remote(robot.api.listen).await?;
-        let (mesh, streams) = start_mesh(robot, keys.clone(), sender.clone(), &trouble).await?;
+        let blobs = BlobStore::open(state, BLOBS_BYTES_MAX)?;
+        let (mesh, streams) =
+            start_mesh(robot, keys.clone(), blobs.clone(), sender.clone(), &trouble).await?;
         let fleet = keys.as_ref().map(|keys| keys.identity().fleet());
         let mut brain_config = config::brain(robot, fleet);
+        brain_config.group = mesh.group();
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
         let facts = brain_config.facts.clone();
         let installed = Installed::new(config::component_path(robot), facts, sender.clone());
@@ -153,7 +157,8 @@ impl World {
         let logs = supervisor_config.logs.clone();
         let supervisor = Supervisor::start(supervisor_config, outlets.clone())
             .map_err(because("components' socket"))?;
-        let store = Store::start(state.clone(), sender.clone(), ground.events.clone())
+        let parts = Parts::new(blobs.clone(), streams.clone(), sender.clone());
+        let store = Store::start(state.clone(), blobs, sender.clone(), ground.events.clone())
             .map_err(because("store"))?;
         let (metrics, data) = start_senses(robot, outlets)?;
 
@@ -177,7 +182,8 @@ impl World {
         let api = Api::start(robot.api.socket.clone(), listener, remote, api_state);
         installed.watch();
         let events = ground.events;
-        let effects = Effects { mesh, store, supervisor, data, desk, events, plan, inputs: sender };
+        let effects =
+            Effects { mesh, store, parts, supervisor, data, desk, events, plan, inputs: sender };
         let world = Self {
             inputs,
             questions,
@@ -228,22 +234,25 @@ impl World {
 async fn start_mesh(
     robot: &RobotConfig,
     keys: Option<FleetKeys>,
+    store: BlobStore,
     inputs: mpsc::Sender<Input>,
     trouble: &Trouble,
 ) -> Result<(Mesh, Option<Streams>), StartError> {
     let address = robot.mesh.listen;
+    let fleet = config::fleet(robot, keys.as_ref().map(|keys| keys.identity().fleet()));
+    let wanted = robot.mesh.discovery.clone();
+    let discovery = wanted.map(|interfaces| Discovery::new(&fleet, interfaces));
     let socket = Mesh::open(address).await;
     let socket = socket.map_err(|source| StartError::Mesh { address, source })?;
     let Some(keys) = keys else {
-        return Ok((Mesh::start(socket, None, inputs, trouble.clone()), None));
+        return Ok((Mesh::start(socket, None, discovery, inputs, trouble.clone()), None));
     };
     let (stream_sender, packets) = mpsc::channel(PACKETS_MAX);
     let (hint_sender, hints) = mpsc::channel(HINTS_MAX);
-    let store = BlobStore::open(robot.storage.state.join("blobs"), BLOBS_BYTES_MAX)?;
     let streams = Streams::start(socket.clone(), packets, keys.clone(), store)?;
     streams.follow_hints(hints);
     let sidings = Sidings { streams: stream_sender, hints: hint_sender };
-    let mesh = Mesh::start(socket, Some((keys, sidings)), inputs, trouble.clone());
+    let mesh = Mesh::start(socket, Some((keys, sidings)), discovery, inputs, trouble.clone());
     Ok((mesh, Some(streams)))
 }
 
@@ -251,7 +260,7 @@ async fn start_mesh(
 fn prepare(robot: &RobotConfig, lock: File) -> Result<Ground, StartError> {
     let state = &robot.storage.state;
     let events = Events::new(robot.name.clone());
-    supervisor::end_leftovers(state, &events);
+    supervisor::end_leftovers(state, &config::supervisor(robot).socket, &events);
     memory::clean(&config::shared_memory(robot));
     let recorder = start_recorder(robot, &events)?;
     let record = match &recorder {

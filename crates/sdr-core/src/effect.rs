@@ -8,11 +8,12 @@ use serde::{Deserialize, Serialize};
 use crate::{
     allocate::Problem,
     api::Accepted,
+    blob::{Blob, BlobHash, BlobRef},
     event::Event,
     id::{ComponentKey, Name, RobotId},
     input::{InstanceId, PlanId, RequestId, StoreTicket},
     order::{Run, Token},
-    record::FleetKey,
+    record::{FleetKey, FleetValue},
     spec::{ComponentSpec, Qos},
 };
 
@@ -32,6 +33,16 @@ pub enum Effect {
         ticket: StoreTicket,
         /// All of it.
         state: StoredState,
+        /// Large parts that `state` names and that may not be on disk yet: they come first.
+        /// Blobs of former states that `state` does not name may go.
+        blobs: Vec<Blob>,
+    },
+    /// Bring a blob, from the own disk or else from another robot; answered by `Fetched`.
+    Fetch {
+        /// Which bytes.
+        blob: BlobRef,
+        /// Robots that may have it, in this order; at most four.
+        from: Vec<SocketAddr>,
     },
     /// Start a process; answered by instance news.
     Launch(Box<LaunchOrder>),
@@ -149,6 +160,18 @@ pub struct StoredState {
     /// Epochs reserved per component: numbers up to this one may have been sent.
     #[serde(default)]
     pub epochs: Vec<(ComponentKey, u64)>,
+}
+
+impl StoredState {
+    /// Blobs that its records name.
+    pub fn blobs(&self) -> impl Iterator<Item = BlobHash> {
+        self.fleet.iter().filter_map(|record| {
+            match FleetValue::decode(record.key.kind, &record.value) {
+                Ok(FleetValue::Large(name)) => Some(name.hash),
+                Ok(_) | Err(_) => None,
+            }
+        })
+    }
 }
 
 /// One record of the fleet table on disk.

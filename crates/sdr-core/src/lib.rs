@@ -36,6 +36,7 @@ pub mod rng;
 pub mod time;
 pub mod units;
 
+pub mod blob;
 pub mod record;
 pub mod report;
 pub mod spec;
@@ -46,6 +47,7 @@ pub mod fitness;
 pub mod recover;
 
 pub mod brain;
+pub mod disk;
 pub mod effect;
 pub mod input;
 

@@ -1,4 +1,5 @@
-//! Ends what a predecessor that was killed left running.
+//! Ends what a predecessor that was killed left running: what its journal names, and, as its
+//! disk may be lost, what was started with this agent's socket.
 
 use std::fs;
 use std::io;
@@ -7,8 +8,10 @@ use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::OwnedFd;
-use rustix::process::{Pid, PidfdFlags, Signal, kill_process_group, pidfd_open};
+use rustix::process::{Pid, PidfdFlags, Signal, getpgid, kill_process_group, pidfd_open};
 use sdr_core::event::Event;
+
+use sdr_component::protocol::{ENV_COMPONENT, ENV_INSTANCE, ENV_SOCKET};
 
 use super::journal::{self, Entry};
 use crate::clock;
@@ -17,11 +20,14 @@ use crate::events::Events;
 /// From SIGTERM to SIGKILL.
 const GRACE: Duration = Duration::from_secs(1);
 
-/// Ends the processes of the journal in `state` that are still the same ones, all at once,
-/// and says so. Blocks for at most [`GRACE`] and the kernel's time to free their memory.
-pub(crate) fn end_leftovers(state: &Path, events: &Events) {
+/// Ends the processes of the journal in `state` that are still the same ones, and those that
+/// were told to speak at `socket`, all at once, and says so. Blocks for at most [`GRACE`] and
+/// the kernel's time to free their memory.
+pub(crate) fn end_leftovers(state: &Path, socket: &Path, events: &Events) {
     let boot_id = journal::boot_id();
-    let entries = journal::read(state);
+    let mut entries = journal::read(state);
+    let listed: Vec<u32> = entries.iter().map(|entry| entry.pid).collect();
+    entries.extend(unlisted(socket, &boot_id).filter(|entry| !listed.contains(&entry.pid)));
     let mut running: Vec<(Entry, Pid, OwnedFd)> = Vec::new();
     for entry in entries {
         if let Some((pid, handle)) = same_process(&entry, &boot_id) {
@@ -37,6 +43,33 @@ pub(crate) fn end_leftovers(state: &Path, events: &Events) {
         let gone = in_peace || wait(&handle, GRACE);
         events.publish(event(events, &entry, gone));
     }
+}
+
+/// Leaders of groups whose environment names `socket`: only an agent of this robot starts such.
+fn unlisted(socket: &Path, boot_id: &str) -> impl Iterator<Item = Entry> {
+    let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
+    processes.filter_map(move |process| {
+        let pid: u32 = process.file_name().to_str()?.parse().ok()?;
+        let leader = getpgid(Pid::from_raw(i32::try_from(pid).ok()?)).ok()?;
+        // Of another user it cannot be read, and is none of ours.
+        let environment = fs::read(process.path().join("environ")).ok()?;
+        let value = |name: &str| {
+            let mut words = environment.split(|byte| *byte == 0);
+            words.find_map(|word| word.strip_prefix(name.as_bytes())?.strip_prefix(b"="))
+        };
+        let ours = value(ENV_SOCKET)? == socket.as_os_str().as_encoded_bytes();
+        let leads = u32::try_from(leader.as_raw_nonzero().get()) == Ok(pid);
+        (ours && leads).then_some(())?;
+        let text = |name| value(name).map(|word| String::from_utf8_lossy(word).into_owned());
+        Some(Entry {
+            component: text(ENV_COMPONENT).unwrap_or_default(),
+            instance: text(ENV_INSTANCE).and_then(|word| word.parse().ok()).unwrap_or_default(),
+            pid,
+            start_time: journal::start_time(pid)?,
+            boot_id: boot_id.into(),
+            executable: fs::read_link(process.path().join("exe")).ok()?,
+        })
+    })
 }
 
 /// A handle to the process when it is the one of the journal. The start time is compared

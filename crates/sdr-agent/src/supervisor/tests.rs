@@ -2,6 +2,7 @@
 
 mod component;
 mod hangs;
+mod leftovers;
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -367,34 +368,5 @@ fn stopping_ends_all_components_deaf_ones_too() {
             assert_eq!(journal::start_time(pid), None);
         }
         assert!(!bench.dir.path().join("c.sock").exists());
-    });
-}
-
-#[test]
-fn leftovers_of_a_killed_agent_are_ended_and_others_are_not() {
-    run(async {
-        let mut bench = Bench::new();
-        bench.script("sleeper", "while true; do sleep 1000; done");
-        bench.launch(1, "sleeper");
-        assert!(matches!(bench.news(1).await, InstanceNews::Started { .. }));
-        // As if an agent had died: its journal, and a process that was given an old number.
-        let predecessor = tempfile::tempdir().unwrap();
-        let mut bystander = std::process::Command::new("sleep").arg("1000").spawn().unwrap();
-        let mut entries = journal::read(bench.dir.path());
-        let mut other = entries[0].clone();
-        other.pid = bystander.id();
-        entries.push(other);
-        fs::write(predecessor.path().join("processes.json"), serde_json::to_vec(&entries).unwrap())
-            .unwrap();
-
-        end_leftovers(predecessor.path(), &bench.events);
-
-        assert!(bench.until_exit(1).await.contains("signal 15"));
-        let said = bench.events.since(0);
-        assert_eq!(said.len(), 1);
-        assert_eq!(said[0].event.kind, "leftover-ended");
-        assert!(bystander.try_wait().unwrap().is_none());
-        bystander.kill().unwrap();
-        bystander.wait().unwrap();
     });
 }

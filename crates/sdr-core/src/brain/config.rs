@@ -4,7 +4,8 @@ use alloc::{boxed::Box, string::String, vec::Vec};
 use core::{fmt, net::SocketAddr, time::Duration};
 
 use crate::{
-    fitness::RolePolicy, id::RobotId, recover::Recovery, report::RobotFacts, spec::PolicyBytes,
+    blob::PART_BYTES_MAX, fitness::RolePolicy, id::RobotId, recover::Recovery, report::RobotFacts,
+    spec::PolicyBytes,
 };
 
 /// Who the robot is and how patient it is.
@@ -18,6 +19,9 @@ pub struct BrainConfig {
     pub facts: RobotFacts,
     /// Where other robots listen: seeds from robot.toml.
     pub seeds: Vec<SocketAddr>,
+    /// Where whoever is on the local network listens, when others are looked for; unlike a
+    /// seed it does not say that there are others.
+    pub group: Option<SocketAddr>,
     /// Where others reach this robot, when it knows.
     pub listen: Option<SocketAddr>,
     /// From the operating system's randomness: incarnation nonce and seed.
@@ -33,6 +37,8 @@ pub struct BrainConfig {
     pub drain_max: Duration,
     /// How the holder of the coordinator role is chosen, until the fleet has a policy of its own.
     pub role_policy: RolePolicy,
+    /// Longest part of a system; less than a blob's where blobs cannot travel.
+    pub part_bytes_max: usize,
     /// How long the target of a move may take to get ready; default 30 s.
     pub prepare_max: Duration,
 }
@@ -45,6 +51,7 @@ impl BrainConfig {
             fleet: String::from("fleet"),
             facts,
             seeds: Vec::new(),
+            group: None,
             listen: None,
             seed: 0,
             gossip_period: Duration::from_millis(350),
@@ -52,6 +59,7 @@ impl BrainConfig {
             rejoin_wait: Duration::from_secs(2),
             drain_max: Duration::from_secs(1),
             role_policy: RolePolicy::default(),
+            part_bytes_max: PART_BYTES_MAX,
             prepare_max: Duration::from_secs(30),
         }
     }

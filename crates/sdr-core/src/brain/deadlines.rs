@@ -25,6 +25,7 @@ impl Brain {
             .chain(self.desk.store_at())
             .chain(self.desk_of_role.wake_at)
             .chain(self.lease.wake_at)
+            .chain(self.blobs.next_deadline())
             .chain(self.guard.wake_at)
             .chain(self.spare_plans.values().map(|plan| plan.at))
             .chain((!self.began).then(|| self.begin_deadline()))

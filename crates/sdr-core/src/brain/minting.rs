@@ -81,6 +81,11 @@ impl Desk {
         own.map(|record| record.version.revision).max()
     }
 
+    /// Records made here that are not in the table yet.
+    pub(super) fn minted(&self) -> impl Iterator<Item = &FleetRecord> {
+        self.mints.iter().flat_map(|mint| &mint.records)
+    }
+
     /// When to try a broken disk again.
     pub(super) fn retry_at(&self) -> Option<Instant> {
         self.broken_at.map(|at| at + DISK_RETRY)
@@ -132,7 +137,7 @@ impl Brain {
             self.epochs.iter().map(|(key, book)| (key.clone(), book.reserved)).collect();
         self.desk.epochs_in_flight = epochs.iter().cloned().collect();
         let mut fleet = self.mesh.fleet().clone();
-        for record in self.desk.mints.iter().flat_map(|mint| &mint.records) {
+        for record in self.desk.minted() {
             fleet.merge(record.clone());
         }
         let mut fleet: Vec<StoredRecord> = fleet.to_stored();
@@ -148,11 +153,13 @@ impl Brain {
             epochs,
             peers: self.mesh.peer_addresses(),
         };
-        self.effects.push_back(Effect::Store { ticket: self.desk.last, state });
+        let blobs = self.blobs.unsaved(self.desk.last);
+        self.effects.push_back(Effect::Store { ticket: self.desk.last, state, blobs });
     }
 
     pub(super) fn handle_stored(&mut self, ticket: StoreTicket) {
         self.desk.spoken = true;
+        self.blobs.saved(ticket);
         if self.desk.broken_at.take().is_some() {
             self.event("minting-resumed", "the disk takes what is decided again");
         }

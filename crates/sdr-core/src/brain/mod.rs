@@ -10,6 +10,7 @@
 //! `decide` acts only on the coordinator, and only mints records; every robot `reconcile`s
 //! what should be on itself with what is. Nothing is ever told to another robot but records.
 
+mod blobs;
 mod conditions;
 mod config;
 mod deadlines;
@@ -69,6 +70,7 @@ use crate::{
     report::{ConditionReport, HostReport},
     time::{Duration, Instant},
 };
+use blobs::BlobDesk;
 use epochs::EpochBook;
 use guard::GuardDesk;
 use index::{Index, Stir};
@@ -148,6 +150,7 @@ pub struct Brain {
     moves: BTreeMap<ComponentKey, MoveWatch>,
     left: BTreeMap<(ComponentKey, RobotId), Instant>,
     desk: Desk,
+    blobs: BlobDesk,
     desk_of_role: RoleDesk,
     lease: Lease,
     duplicates_told: BTreeSet<core::net::SocketAddr>,
@@ -171,7 +174,7 @@ impl Brain {
         let mesh_config = MeshConfig {
             robot: config.robot.clone(),
             fleet: u32::try_from(hash64(config.fleet.as_bytes()) & 0xffff_ffff).unwrap_or(0),
-            seeds: config.seeds.clone(),
+            seeds: config.seeds.iter().copied().chain(config.group).collect(),
             listen: config.listen,
             period: config.gossip_period,
             gone_after: config.gone_after,
@@ -224,10 +227,12 @@ impl Brain {
             moves: BTreeMap::new(),
             left: BTreeMap::new(),
             desk: Desk::default(),
+            blobs: BlobDesk::default(),
             desk_of_role: RoleDesk::default(),
             lease: Lease::default(),
             duplicates_told: BTreeSet::new(),
         });
+        brain.note_blobs(now);
         brain.refresh_all_systems();
         brain.say_facts();
         brain.store_now();
@@ -260,6 +265,7 @@ impl Brain {
             | Input::MoveRole { .. }
             | Input::RolePolicy { .. }
             | Input::Planned { .. }
+            | Input::Fetched { .. }
             | Input::Stored { .. }
             | Input::StoreFailed { .. } => self.stir = Stir::ALL,
         }
@@ -285,6 +291,7 @@ impl Brain {
             Input::MoveRole { request, to } => self.handle_move_role(request, &to),
             Input::RolePolicy { request, policy } => self.handle_role_policy(request, *policy),
             Input::Planned { plan, result } => self.handle_planned(now, plan, result),
+            Input::Fetched { blob, result } => self.handle_fetched(now, blob, result),
             Input::Stored { ticket } => self.handle_stored(ticket),
             Input::StoreFailed { ticket, reason } => self.handle_store_failed(ticket, &reason),
         }
@@ -319,6 +326,7 @@ impl Brain {
     fn settle(&mut self, now: Instant) {
         self.mesh.handle_tick(now);
         self.take_news(now);
+        self.fetch_blobs(now);
         self.notice_time(now);
         self.consider_role(now);
         self.watch_homes(now);

@@ -55,6 +55,9 @@ impl Brain {
                 }
             }
         }
+        if changed.has_parts() {
+            self.note_blobs(now);
+        }
         self.refresh(&changed);
     }
 }

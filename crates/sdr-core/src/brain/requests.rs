@@ -9,6 +9,7 @@ use alloc::{
 use super::Brain;
 use crate::{
     api::{Accepted, DeployAnswer},
+    blob::{BlobRef, PART_BYTES_MAX},
     effect::Effect,
     event::Event,
     id::Name,
@@ -21,6 +22,18 @@ use crate::{
 
 /// More revisions of one system than anybody has deployed.
 const FORGOTTEN_REVISIONS: u64 = 1000;
+
+/// Most bytes that the large parts of one system have together.
+const SYSTEM_BYTES_MAX: usize = 8 << 20;
+
+/// A part of a system that is too long for a record.
+struct LargePart {
+    /// Its key, for people.
+    what: String,
+    name: BlobRef,
+    value: FleetValue,
+    bytes: Vec<u8>,
+}
 
 impl Brain {
     pub(super) fn handle_deploy(&mut self, request: RequestId, system: SystemSpec) {
@@ -36,7 +49,7 @@ impl Brain {
         let settled = self.desk.revision_under_way(&name).is_none();
         let unchanged = settled
             && before.is_some_and(|revision| {
-                let records = self.records_of(&system, revision);
+                let (records, _) = self.records_of(&system, revision);
                 records.iter().all(|record| {
                     record.key.kind == RecordKind::SYSTEM
                         || self
@@ -56,15 +69,35 @@ impl Brain {
             self.effects.push_back(Effect::Answer { request, result: Ok(answer) });
             return;
         }
-        let records = self.records_of(&system, revision);
+        let (records, large) = self.records_of(&system, revision);
         if let Some(long) = records.iter().find(|record| record.value.len() > RECORD_BYTES_MAX) {
+            let (what, found) = (&long.key.name, long.value.len());
+            let text = format!("{what} takes {found} bytes; at most {RECORD_BYTES_MAX}");
+            return self.refuse(request, text);
+        }
+        let total: usize = large.iter().map(|part| part.bytes.len()).sum();
+        if let Some(long) = large.iter().find(|part| part.bytes.len() > self.config.part_bytes_max)
+        {
             let text = format!(
-                "{} takes {} bytes; a record has at most {RECORD_BYTES_MAX} (fewer or shorter parameters)",
-                long.key.name,
-                long.value.len()
+                "{} takes {} bytes; a part of a system has at most {} (fewer or shorter parameters{})",
+                long.what,
+                long.bytes.len(),
+                self.config.part_bytes_max,
+                if self.config.part_bytes_max < PART_BYTES_MAX {
+                    "; more with [mesh] keys"
+                } else {
+                    ""
+                }
             );
             return self.refuse(request, text);
         }
+        if total > SYSTEM_BYTES_MAX {
+            let text = format!(
+                "the large parts of {name} take {total} bytes; a system has at most {SYSTEM_BYTES_MAX}"
+            );
+            return self.refuse(request, text);
+        }
+        large.into_iter().for_each(|part| self.blobs.keep(&part.name, part.value, part.bytes));
         let text = format!("{name}, revision {revision}, {} components", system.components.len());
         let mut event = Event::new("deployed", &self.me, text);
         event.system = Some(name);
@@ -119,8 +152,9 @@ impl Brain {
         Version { epoch: None, revision, term: 0, author: self.me.clone() }
     }
 
-    /// A system as one small record per part; the system's own record comes first.
-    fn records_of(&self, system: &SystemSpec, revision: u64) -> Vec<FleetRecord> {
+    /// A system as one small record per part, and the parts that are too long for one; the
+    /// system's own record comes first.
+    fn records_of(&self, system: &SystemSpec, revision: u64) -> (Vec<FleetRecord>, Vec<LargePart>) {
         let count = |length: usize| u16::try_from(length).unwrap_or(u16::MAX);
         let own = FleetValue::System(SystemRecord {
             name: system.name.clone(),
@@ -156,9 +190,20 @@ impl Brain {
             parts.push((RecordKind::CONNECTION, name, FleetValue::Connection(connection)));
         }
         let version = self.deployment_version(revision);
-        parts
-            .into_iter()
-            .map(|(kind, name, value)| FleetRecord::new(kind, name, version.clone(), &value))
-            .collect()
+        let mut large = Vec::new();
+        let record = |(kind, what, value): (RecordKind, String, FleetValue)| {
+            let bytes = value.encode();
+            let record = match kind.large().filter(|_| bytes.len() > RECORD_BYTES_MAX) {
+                Some(kind) => {
+                    let name = BlobRef::of(&bytes);
+                    large.push(LargePart { what: what.clone(), name, value, bytes });
+                    FleetRecord::new(kind, what, version.clone(), &FleetValue::Large(name))
+                }
+                None => FleetRecord::new(kind, what, version.clone(), &value),
+            };
+            record
+        };
+        let records = parts.into_iter().map(record).collect();
+        (records, large)
     }
 }

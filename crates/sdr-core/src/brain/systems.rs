@@ -54,6 +54,17 @@ pub(super) struct Changed {
 }
 
 impl Changed {
+    /// A part of a system is here now: `name` is its key.
+    pub(super) fn of_part(name: &str) -> Self {
+        let system = name.split('/').next().unwrap_or(name);
+        Self { systems: BTreeSet::from([system.into()]), assignments: BTreeSet::new() }
+    }
+
+    /// Whether parts of systems may be among it.
+    pub(super) fn has_parts(&self) -> bool {
+        !self.systems.is_empty()
+    }
+
     pub(super) fn note(&mut self, key: &FleetKey) {
         match key.kind {
             RecordKind::ASSIGNMENT => {
@@ -63,7 +74,10 @@ impl Changed {
             | RecordKind::COMPONENT
             | RecordKind::CONNECTION
             | RecordKind::ALLOCATION
-            | RecordKind::RECOVERY => {
+            | RecordKind::RECOVERY
+            | RecordKind::LARGE_COMPONENT
+            | RecordKind::LARGE_ALLOCATION
+            | RecordKind::LARGE_RECOVERY => {
                 let system = key.name.split('/').next().unwrap_or(&key.name);
                 self.systems.insert(system.into());
             }
@@ -147,9 +161,12 @@ impl Brain {
             key.name.starts_with(&prefix) && version.revision == revision
         };
         let mut components = Vec::new();
-        for (key, version, value) in fleet.below(RecordKind::COMPONENT, &prefix) {
-            if let (true, FleetValue::Component(spec)) = (current(key, version), value) {
-                components.push(spec.clone());
+        for kind in [RecordKind::COMPONENT, RecordKind::LARGE_COMPONENT] {
+            for (key, version, value) in fleet.below(kind, &prefix) {
+                let part = self.part(value);
+                if let (true, Some(FleetValue::Component(spec))) = (current(key, version), part) {
+                    components.push(spec.clone());
+                }
             }
         }
         let mut connections = Vec::new();
@@ -158,13 +175,23 @@ impl Brain {
                 connections.push(spec.clone());
             }
         }
-        let policy = |kind| match fleet.get(kind, record.name.as_str()) {
-            Some((version, FleetValue::Allocation(policy) | FleetValue::Recovery(policy)))
-                if version.revision == revision =>
-            {
-                Some(policy.clone())
+        let policy = |kind: RecordKind| {
+            let kinds = [Some(kind), kind.large()].into_iter().flatten();
+            let found = kinds.filter_map(|kind| fleet.get(kind, record.name.as_str()));
+            let mut parts = found.filter(|(version, _)| version.revision == revision);
+            match parts.find_map(|(_, value)| self.part(value))? {
+                FleetValue::Allocation(policy) | FleetValue::Recovery(policy) => {
+                    Some(policy.clone())
+                }
+                FleetValue::System(_)
+                | FleetValue::Component(_)
+                | FleetValue::Connection(_)
+                | FleetValue::Assignment(_)
+                | FleetValue::Role(_)
+                | FleetValue::RolePolicy(_)
+                | FleetValue::Large(_)
+                | FleetValue::Unknown => None,
             }
-            Some(_) | None => None,
         };
         let whole = components.len() == usize::from(record.components)
             && connections.len() == usize::from(record.connections);
@@ -183,6 +210,22 @@ impl Brain {
             allocation: policy(RecordKind::ALLOCATION)?,
             recovery: policy(RecordKind::RECOVERY)?,
         })
+    }
+
+    /// A part of a system, from its record or its blob; `None` while the blob is not here.
+    fn part<'a>(&'a self, value: &'a FleetValue) -> Option<&'a FleetValue> {
+        match value {
+            FleetValue::Large(name) => self.blobs.part(name),
+            FleetValue::System(_)
+            | FleetValue::Component(_)
+            | FleetValue::Connection(_)
+            | FleetValue::Allocation(_)
+            | FleetValue::Recovery(_)
+            | FleetValue::Assignment(_)
+            | FleetValue::Role(_)
+            | FleetValue::RolePolicy(_)
+            | FleetValue::Unknown => Some(value),
+        }
     }
 
     /// Where a wanted component should run, as far as somebody decided it.

@@ -135,6 +135,7 @@ impl FleetTable {
             | FleetValue::Assignment(_)
             | FleetValue::Role(_)
             | FleetValue::RolePolicy(_)
+            | FleetValue::Large(_)
             | FleetValue::Unknown => None,
         };
         self.put(record, value);
@@ -309,14 +310,8 @@ impl FleetTable {
     }
 
     fn drop_parts_before(&mut self, system: &str, revision: u64) {
-        let kinds = [
-            RecordKind::COMPONENT,
-            RecordKind::CONNECTION,
-            RecordKind::ALLOCATION,
-            RecordKind::RECOVERY,
-        ];
         let mut outdated = Vec::new();
-        for kind in kinds {
+        for kind in RecordKind::PARTS {
             let from = FleetKey { kind, name: String::from(system) };
             let parts = self
                 .records
@@ -335,13 +330,7 @@ impl FleetTable {
 
 /// The system whose part a record is.
 fn system_of_part(key: &FleetKey) -> Option<&str> {
-    let part = matches!(
-        key.kind,
-        RecordKind::COMPONENT
-            | RecordKind::CONNECTION
-            | RecordKind::ALLOCATION
-            | RecordKind::RECOVERY
-    );
+    let part = RecordKind::PARTS.contains(&key.kind);
     part.then(|| key.name.split('/').next().unwrap_or(&key.name))
 }
 

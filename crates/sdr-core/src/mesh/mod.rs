@@ -49,7 +49,7 @@ pub use news::{Inquiry, MeshConfig, MeshCounters, MeshNews, MeshTraffic, Push};
 pub use wire::{
     AskNews, AskStamps, AuthorDelta, Beat, Beats, DATAGRAM_BYTES_MAX, Datagram, Echo, FleetEntries,
     FleetNodes, Header, LinkMark, News, RosterPiece, SEAL_BYTES_MAX, Section, Stamp, Summary,
-    WireError,
+    WireError, is_plain,
 };
 
 use crate::{
@@ -340,6 +340,11 @@ impl Mesh {
         let silent_before = self.clock - (cycle * 6).max(self.config.gone_after / 2);
         let reports = self.links.reports(self.clock, silent_before);
         reports.map(|(seat, report)| (&self.authors.at(seat).robot, report))
+    }
+
+    /// Where `robot` was heard last.
+    pub fn address(&self, robot: &RobotId) -> Option<SocketAddr> {
+        self.peers.address(self.authors.seat(robot)?)
     }
 
     /// Addresses heard so far.

@@ -12,9 +12,9 @@ mod sources;
 use std::path::Path;
 
 pub use config::{
-    ApiConfig, CapacityConfig, ComponentsConfig, DeviceConfig, LogConfig, LogFormat, LogsConfig,
-    MeshConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig, RosConfig, Seal,
-    SensorsConfig, StorageConfig, SystemPort,
+    ApiConfig, CapacityConfig, ComponentsConfig, DeviceConfig, Interfaces, LogConfig, LogFormat,
+    LogsConfig, MeshConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig, RosConfig,
+    Seal, SensorsConfig, StorageConfig, SystemPort,
 };
 pub use places::Places;
 pub use sources::{BatterySource, PositionSource, RssiSource};

@@ -1,8 +1,16 @@
 //! The disk of one robot: takes its time, may be full, and a crash may come in between.
 
-use std::time::Duration;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+    time::Duration,
+};
 
-use sdr_core::{effect::StoredState, input::StoreTicket};
+use sdr_core::{
+    blob::{Blob, BlobHash},
+    effect::StoredState,
+    input::StoreTicket,
+};
 
 /// Time a write takes on a healthy disk.
 pub(crate) const STORE_TIME: Duration = Duration::from_millis(3);
@@ -12,6 +20,7 @@ pub(crate) const STORE_TIME: Duration = Duration::from_millis(3);
 pub(crate) struct Order {
     pub(crate) ticket: StoreTicket,
     pub(crate) state: StoredState,
+    pub(crate) blobs: Vec<Blob>,
 }
 
 /// One order is written at a time; of those that wait only the newest counts, as each holds
@@ -19,6 +28,7 @@ pub(crate) struct Order {
 #[derive(Debug)]
 pub(crate) struct Disk {
     held: Option<StoredState>,
+    blobs: BTreeMap<BlobHash, Arc<Vec<u8>>>,
     writing: Option<Order>,
     waiting: Option<Order>,
     /// Whether the robot will ever read it; a state that nobody reads is not kept.
@@ -31,6 +41,7 @@ impl Disk {
     pub(crate) fn new() -> Self {
         Self {
             held: None,
+            blobs: BTreeMap::new(),
             writing: None,
             waiting: None,
             is_read: true,
@@ -54,7 +65,7 @@ impl Disk {
         let Some(order) = self.writing.take() else { return (None, false) };
         let ticket = order.ticket;
         if !self.full && self.is_read {
-            self.held = Some(order.state);
+            self.write(order);
         }
         self.writing = self.waiting.take();
         (Some(ticket), self.writing.is_some())
@@ -64,9 +75,24 @@ impl Disk {
     pub(crate) fn crash(&mut self, written: Written) {
         self.waiting = None;
         let under_way = self.writing.take();
-        if written == Written::Whole && !self.full && under_way.is_some() {
-            self.held = under_way.map(|order| order.state);
+        if let (Written::Whole, false, Some(order)) = (written, self.full, under_way) {
+            self.write(order);
         }
+    }
+
+    /// Blobs first, then the state, then what it does not name any more goes.
+    fn write(&mut self, order: Order) {
+        self.blobs.extend(order.blobs.into_iter().map(|blob| (blob.hash, blob.bytes)));
+        if !self.blobs.is_empty() {
+            let named: BTreeSet<BlobHash> = order.state.blobs().collect();
+            self.blobs.retain(|hash, _| named.contains(hash));
+        }
+        self.held = Some(order.state);
+    }
+
+    /// A blob that is here.
+    pub(crate) fn blob(&self, hash: &BlobHash) -> Option<&Arc<Vec<u8>>> {
+        self.blobs.get(hash)
     }
 
     pub(crate) fn wipe(&mut self) {
@@ -90,7 +116,8 @@ mod tests {
     use super::*;
 
     fn order(ticket: StoreTicket) -> Order {
-        Order { ticket, state: StoredState { incarnation: ticket, ..StoredState::default() } }
+        let state = StoredState { incarnation: ticket, ..StoredState::default() };
+        Order { ticket, state, blobs: Vec::new() }
     }
 
     fn held(disk: &Disk) -> Option<u64> {

@@ -23,6 +23,7 @@ mod disk;
 mod draw;
 mod due;
 mod fault;
+mod fetch;
 mod fleet;
 mod flow;
 mod measure;

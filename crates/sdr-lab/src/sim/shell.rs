@@ -35,7 +35,10 @@ impl Fleet {
             effects += 1;
             match effect {
                 Effect::Send { to, bytes } => self.send(number, number_of(to), bytes),
-                Effect::Store { ticket, state } => self.store(number, Order { ticket, state }),
+                Effect::Store { ticket, state, blobs } => {
+                    self.store(number, Order { ticket, state, blobs });
+                }
+                Effect::Fetch { blob, from } => self.fetch(number, blob, &from),
                 Effect::Launch(order) => self.launch(number, *order),
                 Effect::Command { instance, command } => self.command(number, instance, command),
                 Effect::Routes(routes) => self.route(number, &routes),

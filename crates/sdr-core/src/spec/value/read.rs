@@ -146,7 +146,7 @@ impl<'de> Visitor<'de> for Tagged {
 
 #[cfg(test)]
 mod tests {
-    use alloc::{format, vec};
+    use alloc::{format, string::ToString as _, vec};
 
     use super::*;
 
