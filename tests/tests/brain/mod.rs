@@ -2,6 +2,7 @@
 
 mod again;
 mod deployment;
+mod parts;
 mod recovery;
 mod role;
 mod standby;

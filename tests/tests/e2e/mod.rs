@@ -1,7 +1,11 @@
 //! Real agents and real processes, as a user runs them.
 
+mod addresses;
 mod by_hand;
 mod demo;
+mod five;
 mod garbage;
 mod keys;
+mod parts;
 mod role;
+mod strangers;
