@@ -149,6 +149,8 @@ pub struct StoredState {
     /// Epochs reserved per component: numbers up to this one may have been sent.
     #[serde(default)]
     pub epochs: Vec<(ComponentKey, u64)>,
+    /// Robots ever heard of.
+    pub robots: Vec<RobotId>,
 }
 
 /// One record of the fleet table on disk.

@@ -58,6 +58,8 @@ pub enum Defect {
     LeaseNeverEnds,
     /// A successor is chosen before the lease of the home is over.
     LeaseNotAwaited,
+    /// Tombstones are dropped before everybody has them on disk.
+    BuriedTooSoon,
 }
 
 impl Defect {

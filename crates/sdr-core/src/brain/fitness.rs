@@ -106,7 +106,8 @@ impl Brain {
             | Report::Instance(_)
             | Report::Condition(_)
             | Report::Succession(_)
-            | Report::Homeless(_) => None,
+            | Report::Homeless(_)
+            | Report::Stored(_) => None,
         });
         links.collect()
     }
@@ -127,7 +128,8 @@ impl Brain {
                     | Report::Link(..)
                     | Report::Instance(_)
                     | Report::Succession(_)
-                    | Report::Homeless(_) => None,
+                    | Report::Homeless(_)
+                    | Report::Stored(_) => None,
                 },
             );
         told.or_else(|| {

@@ -152,6 +152,7 @@ impl Brain {
         for record in self.desk.mints.iter().flat_map(|mint| &mint.records) {
             fleet.merge(record.clone());
         }
+        self.burial.root_in_flight = Some(fleet.root());
         let mut fleet: Vec<StoredRecord> = fleet.to_stored();
         fleet.retain(|record| match record.key.kind {
             RecordKind::ROLE => !planted::is(Defect::TermNotStored),
@@ -164,6 +165,7 @@ impl Brain {
             runs,
             epochs,
             peers: self.mesh.peer_addresses(),
+            robots: self.roster(),
         };
         self.effects.push_back(Effect::Store { ticket: self.desk.last, state });
     }
@@ -180,6 +182,7 @@ impl Brain {
                     book.note_stored(number);
                 }
             }
+            self.burial.root_stored = self.burial.root_in_flight.take();
             for (key, run) in core::mem::take(&mut self.desk.runs_in_flight) {
                 if let Some(book) = self.runs.get_mut(&key) {
                     book.stored = book.stored.max(run);

@@ -188,7 +188,8 @@ impl Brain {
             | Report::Link(..)
             | Report::Condition(_)
             | Report::Succession(_)
-            | Report::Homeless(_) => None,
+            | Report::Homeless(_)
+            | Report::Stored(_) => None,
         });
         instances.collect()
     }

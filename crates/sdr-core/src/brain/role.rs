@@ -149,7 +149,8 @@ impl Brain {
             | Report::Link(..)
             | Report::Instance(_)
             | Report::Condition(_)
-            | Report::Homeless(_) => None,
+            | Report::Homeless(_)
+            | Report::Stored(_) => None,
         });
         said.filter(|said| said.term == role.term)
     }

@@ -53,6 +53,8 @@ impl SystemNow {
 pub(super) struct Changed {
     systems: BTreeSet<String>,
     assignments: BTreeSet<String>,
+    /// Systems may have been dropped from the table.
+    buried: bool,
 }
 
 impl Changed {
@@ -61,6 +63,7 @@ impl Changed {
             RecordKind::ASSIGNMENT => {
                 self.assignments.insert(key.name.clone());
             }
+            RecordKind::HORIZON => self.buried = true,
             RecordKind::SYSTEM
             | RecordKind::COMPONENT
             | RecordKind::CONNECTION
@@ -87,6 +90,9 @@ impl Brain {
     /// Puts together anew what changed.
     pub(super) fn refresh(&mut self, changed: &Changed) {
         let mut keys: BTreeSet<ComponentKey> = BTreeSet::new();
+        if changed.buried {
+            self.leave_buried(&mut keys);
+        }
         for name in &changed.systems {
             self.refresh_system(name, &mut keys);
         }
@@ -99,6 +105,23 @@ impl Brain {
         for key in keys {
             self.reindex(&key);
         }
+    }
+
+    /// Systems that this robot alone did not know to be dead.
+    fn leave_buried(&mut self, keys: &mut BTreeSet<ComponentKey>) {
+        let fleet = self.mesh.fleet();
+        let is_known = |name: &Name| fleet.get(RecordKind::SYSTEM, name.as_str()).is_some();
+        let buried: Vec<Name> =
+            self.systems.keys().filter(|name| !is_known(name)).cloned().collect();
+        for name in buried {
+            keys.extend(
+                self.systems
+                    .remove(&name)
+                    .iter()
+                    .flat_map(|system| system.keys().collect::<Vec<_>>()),
+            );
+        }
+        self.update_objectors();
     }
 
     /// One system as it is now; an incomplete one keeps its last whole form.
@@ -222,7 +245,8 @@ impl Brain {
             | crate::report::Report::Link(..)
             | crate::report::Report::Condition(_)
             | crate::report::Report::Succession(_)
-            | crate::report::Report::Homeless(_) => None,
+            | crate::report::Report::Homeless(_)
+            | crate::report::Report::Stored(_) => None,
         })
     }
 
@@ -234,7 +258,8 @@ impl Brain {
             | crate::report::Report::Link(..)
             | crate::report::Report::Condition(_)
             | crate::report::Report::Succession(_)
-            | crate::report::Report::Homeless(_) => None,
+            | crate::report::Report::Homeless(_)
+            | crate::report::Report::Stored(_) => None,
         })
     }
 
@@ -246,7 +271,8 @@ impl Brain {
             | crate::report::Report::Link(..)
             | crate::report::Report::Condition(_)
             | crate::report::Report::Succession(_)
-            | crate::report::Report::Homeless(_) => None,
+            | crate::report::Report::Homeless(_)
+            | crate::report::Report::Stored(_) => None,
         })
     }
 

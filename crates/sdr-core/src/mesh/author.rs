@@ -65,6 +65,11 @@ impl AuthorKey {
         Self(String::from("s"))
     }
 
+    /// The key of what a robot says of its disk.
+    pub fn stored() -> Self {
+        Self(String::from("d"))
+    }
+
     /// The key of what was measured of the link to `robot`.
     pub fn link(robot: &RobotId) -> Self {
         Self(format!("l/{robot}"))
@@ -79,6 +84,7 @@ impl AuthorKey {
             Report::Condition(condition) => Self::condition(&condition.system, condition.cause),
             Report::Succession(_) => Self::succession(),
             Report::Homeless(homeless) => Self::homeless(&homeless.component),
+            Report::Stored(_) => Self::stored(),
         }
     }
 }

@@ -16,11 +16,11 @@ use crate::{
     effect::StoredRecord,
     order::{Version, hash64},
     planted::{self, Defect},
-    record::{FleetKey, FleetValue, RECORD_BYTES_MAX, RecordKind},
+    record::{FleetKey, FleetValue, HorizonRecord, RECORD_BYTES_MAX, RecordKind},
 };
 
 /// Most records; more are refused.
-const RECORDS_MAX: usize = 65_536;
+pub(super) const RECORDS_MAX: usize = 65_536;
 /// Longest name of a key.
 const KEY_BYTES_MAX: usize = 100;
 
@@ -80,6 +80,7 @@ pub struct FleetTable {
     /// (key hash, key) of all records.
     hashes: BTreeSet<(u32, FleetKey)>,
     tree: FleetTree,
+    pub(super) horizon: Option<HorizonRecord>,
 }
 
 impl FleetTable {
@@ -113,7 +114,7 @@ impl FleetTable {
         let Ok(value) = FleetValue::decode(record.key.kind, &record.value) else {
             return Merge::Refused;
         };
-        if self.is_outdated(&record) {
+        if self.is_outdated(&record) || self.is_buried(&record.key, &record.version, &value) {
             return Merge::Older;
         }
         match self.records.get(&record.key) {
@@ -135,12 +136,18 @@ impl FleetTable {
             | FleetValue::Assignment(_)
             | FleetValue::Role(_)
             | FleetValue::RolePolicy(_)
+            | FleetValue::Horizon(_)
             | FleetValue::Unknown => None,
         };
+        let horizon = match &value {
+            FleetValue::Horizon(horizon) => Some(horizon.clone()),
+            _ => None,
+        };
         self.put(record, value);
-        if planted::is(Defect::TombstoneDropped) {
-            self.drop_tombstones();
+        if let Some(horizon) = horizon {
+            self.bury(horizon);
         }
+        self.drop_tombstones();
         if let Some((name, version)) = system {
             self.drop_parts_before(&name, &version);
         }
@@ -169,7 +176,11 @@ impl FleetTable {
             let name = String::from(system_of_part(key)?);
             self.record(&FleetKey { kind: RecordKind::SYSTEM, name })
         };
-        self.record(key).or_else(system)
+        let horizon = || {
+            let name = String::new();
+            self.record(&FleetKey { kind: RecordKind::HORIZON, name })
+        };
+        self.record(key).or_else(system).or_else(horizon)
     }
 
     /// All records, by key.
@@ -291,19 +302,7 @@ impl FleetTable {
         }
     }
 
-    /// What no table may do: see [`Defect::TombstoneDropped`].
-    fn drop_tombstones(&mut self) {
-        let is_dead = |value: &FleetValue| matches!(value, FleetValue::System(s) if !s.wanted);
-        let dead: Vec<FleetKey> = self
-            .records
-            .iter()
-            .filter(|(_, (_, value))| is_dead(value))
-            .map(|(key, _)| key.clone())
-            .collect();
-        dead.iter().for_each(|key| self.drop_record(key));
-    }
-
-    fn drop_record(&mut self, key: &FleetKey) {
+    pub(super) fn drop_record(&mut self, key: &FleetKey) {
         if let Some((record, _)) = self.records.remove(key) {
             let hash = key_hash(key);
             self.tree.toggle(hash, record.stamp());
@@ -344,7 +343,7 @@ impl FleetTable {
 }
 
 /// The system whose part a record is.
-fn system_of_part(key: &FleetKey) -> Option<&str> {
+pub(super) fn system_of_part(key: &FleetKey) -> Option<&str> {
     let part = matches!(
         key.kind,
         RecordKind::COMPONENT

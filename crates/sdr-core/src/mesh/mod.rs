@@ -34,6 +34,7 @@ mod round;
 mod spread;
 #[cfg(test)]
 mod tests;
+mod tombs;
 mod wire;
 
 use alloc::{

@@ -152,6 +152,7 @@ fn instances_of(
         | Report::Link(..)
         | Report::Condition(_)
         | Report::Homeless(_)
+        | Report::Stored(_)
         | Report::Succession(_) => None,
     });
     instances.collect()
