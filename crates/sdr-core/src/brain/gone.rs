@@ -16,7 +16,7 @@ use crate::{
 /// Answers to a question about a home are waited for so long ...
 const ANSWERS_FOR: Duration = Duration::from_millis(250);
 /// ... and when nobody answered, it is asked again.
-const ASK_AGAIN: Duration = Duration::from_millis(400);
+const ASK_AGAIN: Duration = Duration::from_millis(100);
 /// Older answers are none.
 const ANSWERS_KEPT: Duration = Duration::from_secs(3);
 
@@ -78,7 +78,7 @@ impl Brain {
         if waited.is_none_or(|waited| waited >= ASK_AGAIN) {
             self.mesh.ask_about(now, home);
         }
-        self.look_at = self.look_at.min(now + ANSWERS_FOR);
+        self.look_at = self.look_at.min(now + ASK_AGAIN);
         false
     }
 
