@@ -141,7 +141,15 @@ impl FleetTable {
         };
         let horizon = match &value {
             FleetValue::Horizon(horizon) => Some(horizon.clone()),
-            _ => None,
+            FleetValue::System(_)
+            | FleetValue::Component(_)
+            | FleetValue::Connection(_)
+            | FleetValue::Allocation(_)
+            | FleetValue::Recovery(_)
+            | FleetValue::Assignment(_)
+            | FleetValue::Role(_)
+            | FleetValue::RolePolicy(_)
+            | FleetValue::Unknown => None,
         };
         self.put(record, value);
         if let Some(horizon) = horizon {

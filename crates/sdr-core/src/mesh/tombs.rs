@@ -13,11 +13,9 @@ use crate::{
 impl FleetTable {
     /// Systems that were undeployed, with the revision that did so.
     pub fn tombstones(&self) -> impl Iterator<Item = (&str, u64)> {
-        self.of_kind(RecordKind::SYSTEM).filter_map(|(key, version, value)| match value {
-            FleetValue::System(system) if !system.wanted => {
-                Some((key.name.as_str(), version.revision))
-            }
-            _ => None,
+        self.of_kind(RecordKind::SYSTEM).filter_map(|(key, version, value)| {
+            let dead = matches!(value, FleetValue::System(system) if !system.wanted);
+            dead.then_some((key.name.as_str(), version.revision))
         })
     }
 
@@ -34,7 +32,16 @@ impl FleetTable {
             FleetValue::Assignment(home) => {
                 horizon.buries(home.component.system.as_str(), home.deployment)
             }
-            _ => system_of_part(key).is_some_and(|of| horizon.buries(of, version.revision)),
+            FleetValue::Component(_)
+            | FleetValue::Connection(_)
+            | FleetValue::Allocation(_)
+            | FleetValue::Recovery(_)
+            | FleetValue::Role(_)
+            | FleetValue::RolePolicy(_)
+            | FleetValue::Horizon(_)
+            | FleetValue::Unknown => {
+                system_of_part(key).is_some_and(|of| horizon.buries(of, version.revision))
+            }
         }
     }
 
