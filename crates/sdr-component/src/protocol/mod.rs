@@ -183,7 +183,7 @@ pub struct InputCounters {
     pub lost: u64,
     /// Samples refused because of an old token so far.
     pub fenced: u64,
-    /// Samples later than the deadline so far.
+    /// Deadlines that passed without a sample while it was active, so far.
     pub late: u64,
     /// Samples that were no message of the port's type so far.
     #[serde(default)]

@@ -29,7 +29,7 @@ impl Component for Doubler {
     fn new(setup: &mut Setup) -> Result<Self, ComponentError> {
         Ok(Self {
             number: setup.input("number")?,
-            double: setup.output("double")?,
+            double: setup.output("double")?.with_safe(&Int32 { data: 0 })?,
             factor: setup.parameter("factor", 1, "by what")?,
         })
     }
@@ -168,6 +168,39 @@ fn a_raised_fault_and_a_panic_lead_to_the_error_state_with_their_reasons() {
         line.order(Order::Reset);
         assert_eq!(line.until_state(LifecycleState::Inactive).fault, None);
     }
+}
+
+#[test]
+fn the_last_sample_of_each_activation_is_the_safe_value() {
+    let agent = Agent::new();
+    let (process, mut line) = agent.prepare(None, ExecutionSetup::OnData);
+    let memory = Memory::open(&agent.memory, "test").unwrap();
+    let source = memory.publisher("test/source/number", 8, 64).unwrap();
+    let doubles = memory.subscriber("test/doubler/double", 8).unwrap();
+    let last = || {
+        let sample = std::iter::from_fn(|| doubles.receive().unwrap()).last()?;
+        Some((sample.payload().to_vec(), sample.header().run))
+    };
+
+    // Raises, panics, is told to deactivate, is told to finish.
+    for (run, number) in (1..).zip([-1, -2, 21, 21]) {
+        line.order(Order::Activate { token: token(1, run) });
+        line.until_state(LifecycleState::Active);
+        send(&source, &token(1, run), 1, number);
+        if number < 0 {
+            line.until_state(LifecycleState::Error);
+            line.order(Order::Reset);
+            line.until_state(LifecycleState::Inactive);
+        } else {
+            line.until(|word| matches!(word, FromComponent::Heard(_)).then_some(()));
+            line.order(if run == 3 { Order::Deactivate } else { Order::Finish });
+            let end = [LifecycleState::Inactive, LifecycleState::Finalized];
+            line.until_state(end[usize::from(run == 4)]);
+        }
+        assert_eq!(last(), Some((vec![0, 0, 0, 0], run)), "activation {run}");
+    }
+    assert_eq!(last(), None);
+    assert!(process.wait().success());
 }
 
 #[test]
