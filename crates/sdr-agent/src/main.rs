@@ -21,6 +21,7 @@ mod memory;
 mod mesh;
 mod metrics;
 mod plan;
+mod programs;
 mod record;
 mod run;
 mod store;

@@ -30,6 +30,7 @@ use crate::mesh::{
     watch::MeshWatch,
 };
 use crate::metrics::{Metrics, SensorPorts, Watch};
+use crate::programs::Programs;
 use crate::record::{self, RecordSender, Recorder, RecorderNews};
 use crate::store::{self, Remembered, Store};
 use crate::supervisor::{self, Outlets, Supervisor};
@@ -143,7 +144,8 @@ impl World {
         let mut brain_config = config::brain(robot, fleet);
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
         let facts = brain_config.facts.clone();
-        let installed = Installed::new(config::component_path(robot), facts, sender.clone());
+        let looked_at = (config::component_path(robot), config::devices(robot));
+        let installed = Installed::new(looked_at, facts, sender.clone());
         let brain = Brain::new(brain_config, seams(), ground.stored, clock::now());
 
         let outlets = Outlets {
@@ -181,7 +183,10 @@ impl World {
         let api = Api::start(robot.api.socket.clone(), listener, remote, api_state);
         installed.watch();
         let events = ground.events;
-        let effects = Effects { mesh, store, supervisor, data, desk, events, plan, inputs: sender };
+        let programs = config::component_path(robot);
+        let programs = Programs::new(robot.name.clone(), programs, sender.clone());
+        let effects =
+            Effects { mesh, store, supervisor, data, desk, events, plan, programs, inputs: sender };
         let world = Self {
             inputs,
             questions,

@@ -24,7 +24,10 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::{Parser, Subcommand};
 
 use crate::{
-    command::{completions, deploy, events, keys, logs, role, sim, status, undeploy, validate},
+    command::{
+        completions, deploy, events, keys, logs, policy, reset, role, sim, status, undeploy,
+        validate,
+    },
     failure::Failure,
     output::{Format, Output},
 };
@@ -72,6 +75,10 @@ enum Command {
     Events(events::EventsArgs),
     /// Show what a component wrote
     Logs(logs::LogsArgs),
+    /// Try a component anew that is held, or stopped by an emergency stop
+    Reset(reset::ResetArgs),
+    /// Say in words what a recovery policy does
+    Policy(policy::PolicyArgs),
     /// Show, explain and change who coordinates
     Role(role::RoleArgs),
     /// Make, give out and take back the fleet's keys
@@ -105,6 +112,8 @@ async fn run(command: Command, session: &Session) -> Result<ExitCode, Failure> {
         Command::Status(args) => status::run(args, session).await,
         Command::Events(args) => events::run(args, session).await,
         Command::Logs(args) => logs::run(args, session).await,
+        Command::Reset(args) => reset::run(args, session).await,
+        Command::Policy(args) => policy::run(args, session),
         Command::Role(args) => role::run(args, session).await,
         Command::Keys(args) => keys::run(args, session).await,
         Command::Report(args) => report::run(args, session).await,

@@ -6,7 +6,7 @@ use core::net::SocketAddr;
 use crate::{
     allocate::{AllocError, Plan},
     fitness::RolePolicy,
-    id::{Name, RobotId},
+    id::{ComponentKey, Name, RobotId},
     lifecycle::LifecycleState,
     order::Token,
     recover::Cause,
@@ -22,6 +22,19 @@ pub type RequestId = u64;
 pub type StoreTicket = u64;
 /// Names one [`crate::effect::Effect::Plan`]; grows.
 pub type PlanId = u64;
+/// Names one [`crate::effect::Effect::Ask`]; grows.
+pub type QuestionId = u64;
+
+/// One cause that a program of the operator's found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// The component, by its name in the system.
+    pub component: Name,
+    /// What is wrong with it; `None`: the only cause that the program may find.
+    pub cause: Option<Cause>,
+    /// Why, for people.
+    pub reason: String,
+}
 
 /// One thing that happened outside.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +82,13 @@ pub enum Input {
         /// Which one.
         system: Name,
     },
+    /// An operator wants a component to be tried anew, whatever held it.
+    Reset {
+        /// To be answered.
+        request: RequestId,
+        /// Which one.
+        component: ComponentKey,
+    },
     /// An operator wants a robot to hold the coordinator role.
     MoveRole {
         /// To be answered.
@@ -82,6 +102,13 @@ pub enum Input {
         request: RequestId,
         /// How; checked by the shell.
         policy: Box<RolePolicy>,
+    },
+    /// A program of the operator's answered, or did not.
+    Told {
+        /// Of which question.
+        question: QuestionId,
+        /// What it found; the error is for people.
+        result: Result<Vec<Finding>, String>,
     },
     /// A plan is ready.
     Planned {
@@ -132,6 +159,13 @@ pub enum InstanceNews {
         connection: u16,
         /// The token accepted.
         token: Token,
+    },
+    /// One of its inputs counted samples that came later than its deadline.
+    Late {
+        /// The connection's index in its system.
+        connection: u16,
+        /// How many, since the instance began.
+        count: u64,
     },
     /// Its process ended.
     Exited {

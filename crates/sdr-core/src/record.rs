@@ -38,6 +38,8 @@ impl RecordKind {
     pub const ROLE: Self = Self(7);
     /// [`RolePolicy`], keyed by nothing.
     pub const ROLE_POLICY: Self = Self(10);
+    /// [`Latch`], keyed by the component.
+    pub const LATCH: Self = Self(14);
 }
 
 /// Names one shared fact.
@@ -111,6 +113,18 @@ pub struct RoleRecord {
     pub by_operator: bool,
 }
 
+/// Whether a component must not act until somebody resets it. It stands in the fleet's table,
+/// so that neither a restart of its agent nor another home starts what drives a body.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Latch {
+    /// Which component.
+    pub component: ComponentKey,
+    /// Whether it is latched; a reset says that it is not.
+    pub latched: bool,
+    /// Why, for people.
+    pub reason: String,
+}
+
 /// A checked value of the fleet table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FleetValue {
@@ -130,6 +144,8 @@ pub enum FleetValue {
     Role(RoleRecord),
     /// How its holder is chosen.
     RolePolicy(RolePolicy),
+    /// An emergency stop, or its end.
+    Latch(Latch),
     /// A kind that this version does not know; kept and passed on.
     Unknown,
 }
@@ -149,6 +165,7 @@ impl FleetValue {
             RecordKind::ASSIGNMENT => take(bytes).map(Self::Assignment),
             RecordKind::ROLE => take(bytes).map(Self::Role),
             RecordKind::ROLE_POLICY => take(bytes).map(Self::RolePolicy),
+            RecordKind::LATCH => take(bytes).map(Self::Latch),
             _ => Ok(Self::Unknown),
         }
     }
@@ -163,6 +180,7 @@ impl FleetValue {
             Self::Assignment(value) => postcard::to_allocvec(value),
             Self::Role(value) => postcard::to_allocvec(value),
             Self::RolePolicy(value) => postcard::to_allocvec(value),
+            Self::Latch(value) => postcard::to_allocvec(value),
             Self::Unknown => Ok(Vec::new()),
         };
         bytes.expect("writing plain data to memory cannot fail")

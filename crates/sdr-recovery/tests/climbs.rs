@@ -304,11 +304,11 @@ fn a_break_between_two_looks_is_seen_at_its_deadline() {
 
 #[test]
 fn an_engine_is_made_from_bytes_and_says_whose_bytes_are_broken() {
-    assert_eq!(make(&PolicyBytes::default()).unwrap().not_back_for().as_secs(), 120);
+    assert_eq!(make(&PolicyBytes::default()).unwrap().not_back_for(&key("camera")).as_secs(), 120);
     let broken = PolicyBytes { name: "mine".into(), bytes: vec![9] };
     assert_eq!(
         make(&broken).err().unwrap(),
-        "recovery policy `mine`: policy version 9; this agent reads up to 3"
+        "recovery policy `mine`: policy version 9; this agent reads version 4"
     );
 }
 

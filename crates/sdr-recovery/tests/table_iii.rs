@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use build::{Scene, at, key, orders, restart_after};
 use sdr_core::{
-    recover::{Cause, Recovery, Remedy, RemedyOutcome, RobotEvidence},
+    recover::{Cause, Recovery, Remedy, RemedyOutcome, RobotEvidence, Spread},
     units::{Bytes, Dbm, Permille},
 };
 use sdr_recovery::Policy;
@@ -218,9 +218,9 @@ fn a_low_radio_level_moves_all_components_half_a_second_and_six_after_it_fell() 
 fn delay_jitter_and_loss_move_all_components_after_six_seconds() {
     let millis = Duration::from_millis;
     let rows = [
-        first(|robot| robot.delay = Some(millis(200))),
-        first(|robot| robot.jitter = Some(millis(100))),
-        first(|robot| robot.loss = Some(Permille(200))),
+        first(|robot| robot.delay = Some(Spread::of_one(millis(200)))),
+        first(|robot| robot.jitter = Some(Spread::of_one(millis(100)))),
+        first(|robot| robot.loss = Some(Spread::of_one(Permille(200)))),
     ];
     let causes = [Cause::DelayHigh, Cause::JitterHigh, Cause::LossHigh];
     for ((at, found, orders), cause) in rows.into_iter().zip(causes) {
@@ -247,9 +247,9 @@ fn just_beside_every_bar_nothing_happens() {
             cpu: Some(Permille(949)),
             battery: Some(Permille(151)),
             rssi: Some(Dbm::from_tenths(-799)),
-            delay: Some(Duration::from_micros(199_999)),
-            jitter: Some(Duration::from_micros(99_999)),
-            loss: Some(Permille(199)),
+            delay: Some(Spread::of_one(Duration::from_micros(199_999))),
+            jitter: Some(Spread::of_one(Duration::from_micros(99_999))),
+            loss: Some(Spread::of_one(Permille(199))),
         };
     });
     scene.all[0].cpu = Permille(949);

@@ -10,6 +10,7 @@ mod events;
 mod keys;
 mod logs;
 mod remote;
+mod reset;
 mod role;
 mod views;
 
@@ -223,6 +224,7 @@ fn router(state: ApiState) -> Router {
         .route("/v1/recording", get(views::recording))
         .route("/v1/deploy", post(deploy::deploy))
         .route("/v1/systems/{name}", delete(deploy::undeploy))
+        .route("/v1/reset", post(reset::reset))
         .route("/v1/role/move", post(role::hand_over))
         .route("/v1/role/policy", post(role::set_policy))
         .route("/v1/events", get(events::events))

@@ -33,7 +33,7 @@ impl Bench {
         let bin = vec![dir.path().join("bin")];
         let state = ApiState {
             robot,
-            installed: Installed::new(bin.clone(), facts(), sender.clone()),
+            installed: Installed::new((bin.clone(), vec![]), facts(), sender.clone()),
             inputs: sender,
             questions: asker,
             desk: AnswerDesk::default(),

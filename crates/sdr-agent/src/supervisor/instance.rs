@@ -3,17 +3,19 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use sdr_core::{lifecycle::LifecycleState, spec::Execution, time::Instant};
+use sdr_core::{lifecycle::LifecycleState, recover::HangLimit, spec::Execution, time::Instant};
 
 use super::Patience;
 
 /// Periods without a beat that are still fine.
-const BEATS_MISSED_MAX: u32 = 5;
+const BEATS_MISSED_MAX: u16 = 5;
 
 /// What one process is waited for.
 #[derive(Debug)]
 pub(super) struct Life {
     patience: Patience,
+    /// The period of a periodic component.
+    period: Duration,
     /// Longest pause between two beats while active.
     beat_max: Duration,
     /// Longest pause between two beats while inactive.
@@ -92,9 +94,10 @@ impl Life {
             Execution::Periodic { period } => period,
             Execution::OnData => Duration::ZERO,
         };
-        let missed_max = period.saturating_mul(BEATS_MISSED_MAX);
+        let missed_max = period.saturating_mul(BEATS_MISSED_MAX.into());
         Self {
             patience,
+            period,
             beat_max: patience.beat.max(missed_max),
             beat_idle_max: patience.beat_idle.max(missed_max),
             phase: Phase::Starting,
@@ -105,6 +108,17 @@ impl Life {
             initialized: false,
             told: false,
         }
+    }
+
+    /// Takes it for hung after this silence while active; `None`: after the usual one.
+    pub(super) fn be_patient(&mut self, limit: Option<HangLimit>) {
+        let usual = HangLimit::Periods(BEATS_MISSED_MAX);
+        self.beat_max = match limit.unwrap_or(usual) {
+            HangLimit::Periods(periods) => {
+                self.patience.beat.max(self.period.saturating_mul(periods.into()))
+            }
+            HangLimit::Time(limit) => limit,
+        };
     }
 
     /// `configure` was sent.

@@ -1,12 +1,13 @@
 //! One task a process: from its start to its end, which is told exactly once.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::rc::Rc;
 
 use rustix::process::Signal;
 use sdr_component::protocol::{
-    Configure, ErrorReport, FromComponent, Hello, LineBuffer, Order, PROTOCOL_VERSION, StateReport,
-    ToComponent,
+    Configure, ErrorReport, FromComponent, Hello, InputCounters, LineBuffer, Order,
+    PROTOCOL_VERSION, StateReport, ToComponent,
 };
 use sdr_core::{
     effect::{Command, LaunchOrder},
@@ -52,6 +53,8 @@ pub(super) struct Keeper {
     life: Life,
     configured: bool,
     pending: Vec<Order>,
+    /// Missed deadlines by connection, as they were told last.
+    late: BTreeMap<u16, u64>,
     /// When this task last ran, to know a stall of the agent from one of the component.
     turned_at: Instant,
 }
@@ -104,6 +107,7 @@ impl Keeper {
             life,
             configured: false,
             pending: Vec::new(),
+            late: BTreeMap::new(),
             turned_at: now,
         }
     }
@@ -162,6 +166,7 @@ impl Keeper {
             Command::Activate(token) => self.tell(Order::Activate { token }).await,
             Command::Deactivate => self.tell(Order::Deactivate).await,
             Command::Reset => self.tell(Order::Reset).await,
+            Command::Patience(limit) => self.life.be_patient(limit),
             Command::Finish => {
                 self.life.finish(now);
                 match self.link {
@@ -286,11 +291,25 @@ impl Keeper {
             FromComponent::Beat(_) => self.life.beat(clock::now()),
             FromComponent::Counters(counters) => {
                 samples::record(&counters, &self.order, &self.shared.outlets.record);
+                self.late(&counters.inputs).await;
             }
             FromComponent::Error(report) => {
                 let component = &self.order.component;
                 tracing::warn!(event = "component-says", %component, "{}", report.message);
                 self.life.answered(clock::now());
+            }
+        }
+    }
+
+    /// Tells the brain of deadlines that were missed since it was told last.
+    async fn late(&mut self, inputs: &[InputCounters]) {
+        let wired = |connection| self.order.inputs.iter().any(|one| one.connection == connection);
+        for input in inputs.iter().filter(|input| wired(input.connection)) {
+            let (connection, count) = (input.connection, input.late);
+            let told = self.late.insert(connection, count).unwrap_or(0);
+            if count != told {
+                let news = InstanceNews::Late { connection, count };
+                self.shared.tell(self.order.instance, news).await;
             }
         }
     }

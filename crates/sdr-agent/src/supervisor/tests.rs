@@ -135,13 +135,10 @@ impl Bench {
 
     async fn until_hung(&mut self, instance: InstanceId) -> String {
         loop {
-            match self.news(instance).await {
-                InstanceNews::Hung { reason } => return reason,
-                news @ InstanceNews::Exited { .. } => panic!("{news:?}"),
-                InstanceNews::Started { .. }
-                | InstanceNews::LaunchFailed { .. }
-                | InstanceNews::State { .. }
-                | InstanceNews::Heard { .. } => {}
+            let news = self.news(instance).await;
+            assert!(!matches!(news, InstanceNews::Exited { .. }), "{news:?}");
+            if let InstanceNews::Hung { reason } = news {
+                return reason;
             }
         }
     }

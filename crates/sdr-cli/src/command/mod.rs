@@ -5,6 +5,8 @@ pub(crate) mod deploy;
 pub(crate) mod events;
 pub(crate) mod keys;
 pub(crate) mod logs;
+pub(crate) mod policy;
+pub(crate) mod reset;
 pub(crate) mod role;
 pub(crate) mod sim;
 pub(crate) mod status;

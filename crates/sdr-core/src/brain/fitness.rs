@@ -3,7 +3,7 @@
 use alloc::{format, vec::Vec};
 use core::cmp::Reverse;
 
-use super::{Brain, conditions::is_event};
+use super::Brain;
 use crate::{
     fitness::{Figures, Fitness, RolePolicy},
     id::RobotId,
@@ -118,7 +118,7 @@ impl Brain {
         let told =
             author.into_iter().flat_map(|author| author.reports()).find_map(
                 |report| match report {
-                    Report::Condition(condition) if !is_event(condition.cause) => {
+                    Report::Condition(condition) if condition.cause.is_of_robot() => {
                         Some(format!("{}: {}", condition.cause, condition.reason))
                     }
                     Report::Condition(_)

@@ -107,6 +107,8 @@ impl Brain {
     /// What stands by here, its instance ready or only its place kept.
     fn followed(&self) -> Vec<Followed> {
         let keys = self.index.beside(&self.me);
+        // What drives a body and stopped stays where it is.
+        let keys = keys.filter(|key| self.latched(key).is_none());
         keys.filter_map(|key| {
             let (_, assignment) = self.wanted(key)?;
             let place = assignment.standbys.iter().position(|robot| *robot == self.me)?;

@@ -9,6 +9,7 @@ use alloc::{
 use super::Brain;
 use crate::{
     id::{ComponentKey, RobotId},
+    input::Input,
     record::Assignment,
 };
 

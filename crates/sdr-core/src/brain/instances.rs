@@ -15,7 +15,7 @@ use crate::{
     input::{InstanceId, InstanceNews},
     lifecycle::LifecycleState,
     order::{Run, Token},
-    recover::{Cause, Fault},
+    recover::{Cause, Fault, HangLimit},
     report::Usage,
     time::{Duration, Instant},
 };
@@ -50,6 +50,14 @@ pub(super) struct Instance {
     pub(super) ready: bool,
     pub(super) usage: Usage,
     pub(super) heard: BTreeMap<u16, Token>,
+    /// Late samples by input connection, as it counts them.
+    pub(super) late: BTreeMap<u16, u64>,
+    /// Deadlines of readers here that its outputs missed.
+    pub(super) deadlines_missed: u64,
+    /// Deadlines that its inputs from other robots missed.
+    pub(super) inputs_late: u64,
+    /// The silence after which its keeper takes it for hung.
+    pub(super) patience: Option<HangLimit>,
 }
 
 impl Instance {
@@ -64,6 +72,10 @@ impl Instance {
             ready: false,
             usage: Usage::default(),
             heard: BTreeMap::new(),
+            late: BTreeMap::new(),
+            deadlines_missed: 0,
+            inputs_late: 0,
+            patience: None,
         }
     }
 
@@ -146,6 +158,7 @@ impl Brain {
                 }
             }
             InstanceNews::Heard { connection, token } => self.handle_heard(id, connection, token),
+            InstanceNews::Late { connection, count } => self.handle_late(id, connection, count),
         }
     }
 
@@ -191,6 +204,43 @@ impl Brain {
             .map_or_else(|| connection.to_string(), |c| c.label());
         let event = Event::new("heard", &self.me, label).about(&key).under(&token);
         self.push_event(event.number("connection", f64::from(connection)));
+    }
+
+    /// Whose fault a missed deadline is: its writer's, when that runs here; else all that is
+    /// known is that the reader does not get what it needs.
+    fn handle_late(&mut self, id: InstanceId, connection: u16, count: u64) {
+        let Some(instance) = self.instances.get_mut(&id) else { return };
+        let before = instance.late.insert(connection, count).unwrap_or(0);
+        let missed = count.saturating_sub(before);
+        let key = instance.component.clone();
+        let Some(system) = self.systems.get(&key.system) else { return };
+        let wire = system.connections.iter().find(|wire| wire.index == connection);
+        let Some(writer) = wire.map(|wire| system.key(&wire.from.component)) else { return };
+        if self.home(&writer) != Some(&self.me) {
+            self.instances.get_mut(&id).expect("found above").inputs_late += missed;
+            return;
+        }
+        // While it does not run, that is the fault, and it is seen by itself.
+        let writer = self.current(&writer).and_then(|id| self.instances.get_mut(&id));
+        if let Some(writer) = writer.filter(|one| one.state == LifecycleState::Active) {
+            writer.deadlines_missed += missed;
+        }
+    }
+
+    /// Tells keepers how long the policy lets their components be silent.
+    pub(super) fn update_patience(&mut self) {
+        let mut changed = Vec::new();
+        for (id, instance) in &self.instances {
+            let engine = self.engines.get(&instance.component.system);
+            let limit = engine.and_then(|one| one.recovery.hang_limit(&instance.component));
+            if engine.is_some() && limit != instance.patience {
+                changed.push((*id, limit));
+            }
+        }
+        for (id, limit) in changed {
+            self.instances.get_mut(&id).expect("listed above").patience = limit;
+            self.command(id, Command::Patience(limit));
+        }
     }
 
     /// A process ended or never was; a fault unless it was told to end.

@@ -30,6 +30,9 @@ impl Brain {
         if !due || ending || !self.may_begin(now) || self.is_given_up(key) {
             return;
         }
+        if self.refuse_without_device(key) {
+            return;
+        }
         self.restarts.remove(key);
         self.launch(key);
     }

@@ -24,6 +24,7 @@ impl Brain {
                     self.stir = Stir::ALL;
                     self.note_home(now, &key);
                     changed.note(&key);
+                    self.take_latch(&key);
                 }
                 MeshNews::Alive(robot) => {
                     let text = format!("{robot} is heard");

@@ -80,6 +80,10 @@ impl Brain {
             self.finish(id);
             return;
         }
+        if self.latched(key).is_some() {
+            self.be_latched(id, key);
+            return;
+        }
         if !self.may_act(now, key) {
             self.be_silent(now, id, key);
             return;

@@ -135,6 +135,7 @@ impl FleetTable {
             | FleetValue::Assignment(_)
             | FleetValue::Role(_)
             | FleetValue::RolePolicy(_)
+            | FleetValue::Latch(_)
             | FleetValue::Unknown => None,
         };
         self.put(record, value);

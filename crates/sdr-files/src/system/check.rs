@@ -20,7 +20,7 @@ use super::{
         SystemFile,
     },
     order::{check_names, check_start_order},
-    policies::policies,
+    policies::{OwnRules, policies},
 };
 use crate::{
     policy::Finder,
@@ -44,9 +44,10 @@ pub(super) fn checked(
     reader: &mut Reader,
 ) -> Option<LoadedSystem> {
     let system = file.system.0;
+    let At { value: Map(mut entries), mark } = file.components.0?;
+    let own = own_recovery(&mut entries);
     let (allocation, recovery) =
-        policies(file.allocation, file.recovery, (finder, system.as_ref()), reader);
-    let At { value: Map(entries), mark } = file.components.0?;
+        policies((file.allocation, file.recovery, own), (finder, system.as_ref()), reader);
     if entries.is_empty() {
         reader.problem(mark, "a system has at least one component", None);
     }
@@ -86,6 +87,15 @@ pub(super) fn checked(
         reader.problem(system.mark, error.to_string(), None);
     }
     Some(LoadedSystem { spec, places })
+}
+
+/// Rules that components have of their own, taken out of their tables.
+fn own_recovery(entries: &mut [(At<String>, Option<At<ComponentTable>>)]) -> Vec<OwnRules> {
+    let own = entries.iter_mut().filter_map(|(name, table)| {
+        let entry = table.as_mut()?.value.recovery.take()?;
+        Some((name.value.clone(), entry))
+    });
+    own.collect()
 }
 
 pub(super) fn check_size(value: &FleetValue, mark: Mark, what: &str, reader: &mut Reader) {

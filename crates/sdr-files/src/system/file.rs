@@ -83,6 +83,8 @@ table! {
         standby: Option<StandbyTable>,
         /// What it does when its robot hears nobody.
         on_isolation: Option<At<IsolationEntry>>,
+        /// Rules of its own in trouble: changes to those of the system, or the name of a policy.
+        recovery: Option<At<PolicyEntry<RecoveryFile>>>,
     }
     later {
         limits: "hard limits",

@@ -55,7 +55,7 @@ pub use fleet::{ActiveProcess, Fleet};
 pub use plain::Plain;
 pub use process::{Behaviour, Process};
 pub use record::{Figures, Rate, Record, Spread};
-pub use robot::Robot;
+pub use robot::{MakeRecovery, Robot};
 pub use setup::Setup;
 pub use shrink::{Shrunk, fair_weather, shrink};
 pub use sight::Sight;

@@ -7,11 +7,13 @@ use sdr_core::{
     brain::{Brain, BrainConfig, Seams},
     effect::{Direction, Route},
     id::RobotId,
-    input::InstanceId,
+    input::{Finding, InstanceId},
     lifecycle::LifecycleState,
     order::Token,
     record::{FleetValue, RecordKind},
+    recover::Recovery,
     report::{HostReport, RobotFacts, RolePreference, Usage},
+    spec::PolicyBytes,
     time::Instant,
     units::{Bytes, Permille},
 };
@@ -22,6 +24,9 @@ use super::{
     disk::Disk,
     process::{Behaviour, Process},
 };
+
+/// What makes the recovery of a policy; the error is for people.
+pub type MakeRecovery = fn(&PolicyBytes) -> Result<Box<dyn Recovery + Send>, String>;
 
 /// Memory that the agent itself takes.
 const AGENT_MEMORY: Bytes = Bytes::mega(12);
@@ -38,6 +43,10 @@ pub struct Robot {
     pub takes: Option<Usage>,
     /// How processes of a component (by name) behave here; as usual when absent.
     pub behaviours: BTreeMap<String, Behaviour>,
+    /// What its operator's programs answer; `None`: there are none.
+    pub says: Option<Vec<Finding>>,
+    /// What makes its recovery of a policy, from its next start on.
+    pub recovery: MakeRecovery,
     /// Starts of processes so far.
     pub launches: usize,
     pub(crate) number: usize,
@@ -76,6 +85,8 @@ impl Robot {
             facts,
             takes: None,
             behaviours: BTreeMap::new(),
+            says: None,
+            recovery: sdr_recovery::make,
             launches: 0,
             number,
             life: 0,
@@ -114,7 +125,7 @@ impl Robot {
             ..BrainConfig::new(self.id.clone(), self.facts.clone())
         };
         let seams = Seams {
-            recovery: Box::new(sdr_recovery::make),
+            recovery: Box::new(self.recovery),
             allocation: Box::new(sdr_alloc::check),
         };
         self.brain = Some(Brain::new(config, seams, self.disk.held().cloned(), shown));
