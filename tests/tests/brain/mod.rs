@@ -2,7 +2,9 @@
 
 mod again;
 mod deployment;
+mod own_recovery;
 mod policies;
 mod recovery;
 mod role;
+mod rules;
 mod standby;

@@ -108,6 +108,26 @@ fn take_out(
 }
 
 impl Brain {
+    /// What an input makes worth looking at; datagrams do so by their news.
+    pub(super) fn stir_for(&mut self, input: &Input) {
+        match input {
+            Input::Tick | Input::Datagram { .. } => {}
+            Input::Host(_) | Input::Told { .. } => self.judge_due = true,
+            Input::Usage(_) => self.usage_due = true,
+            Input::Facts(_)
+            | Input::Instance { .. }
+            | Input::Route { .. }
+            | Input::Deploy { .. }
+            | Input::Undeploy { .. }
+            | Input::Reset { .. }
+            | Input::MoveRole { .. }
+            | Input::RolePolicy { .. }
+            | Input::Planned { .. }
+            | Input::Stored { .. }
+            | Input::StoreFailed { .. } => self.stir = Stir::ALL,
+        }
+    }
+
     /// Looks anew at where a component stands.
     pub(super) fn reindex(&mut self, key: &ComponentKey) {
         self.index.forget(key);

@@ -264,26 +264,6 @@ impl Brain {
         self.settle(now);
     }
 
-    /// What an input makes worth looking at; datagrams do so by their news.
-    fn stir_for(&mut self, input: &Input) {
-        match input {
-            Input::Tick | Input::Datagram { .. } => {}
-            Input::Host(_) | Input::Told { .. } => self.judge_due = true,
-            Input::Usage(_) => self.usage_due = true,
-            Input::Facts(_)
-            | Input::Instance { .. }
-            | Input::Route { .. }
-            | Input::Deploy { .. }
-            | Input::Undeploy { .. }
-            | Input::Reset { .. }
-            | Input::MoveRole { .. }
-            | Input::RolePolicy { .. }
-            | Input::Planned { .. }
-            | Input::Stored { .. }
-            | Input::StoreFailed { .. } => self.stir = Stir::ALL,
-        }
-    }
-
     fn take(&mut self, now: Instant, input: Input) {
         match input {
             Input::Tick => {}

@@ -124,10 +124,8 @@ impl Robot {
             seed: (self.life << 40) ^ (self.number as u64) << 33,
             ..BrainConfig::new(self.id.clone(), self.facts.clone())
         };
-        let seams = Seams {
-            recovery: Box::new(self.recovery),
-            allocation: Box::new(sdr_alloc::check),
-        };
+        let seams =
+            Seams { recovery: Box::new(self.recovery), allocation: Box::new(sdr_alloc::check) };
         self.brain = Some(Brain::new(config, seams, self.disk.held().cloned(), shown));
     }
 
