@@ -14,6 +14,7 @@ mod client;
 mod command;
 mod demo;
 mod failure;
+mod lab;
 mod locate;
 mod output;
 mod render;
@@ -80,6 +81,14 @@ enum Command {
     Report(report::ReportArgs),
     /// Run three robots, five components and one move on this machine
     Demo(demo::DemoArgs),
+    /// Run a scenario: real agents on a played radio, and what must come of it
+    Lab(lab::LabArgs),
+    /// A robot of the lab, seen from inside; `sdr lab` starts it
+    #[command(name = sdr_lab::bed::ROLE, hide = true)]
+    LabRole {
+        /// Which
+        role: String,
+    },
     /// Run the agents' brains in virtual time, under faults
     Sim(sim::SimArgs),
     /// Print a completion script for a shell
@@ -88,6 +97,10 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    if let Command::LabRole { role } = &cli.command {
+        // Before there is any thread: namespaces are entered by a process that has only one.
+        return sdr_lab::bed::play(role);
+    }
     let session = Session { agent: cli.agent, keys: cli.keys, output: Output::new(cli.output) };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let ended = match runtime {
@@ -109,6 +122,8 @@ async fn run(command: Command, session: &Session) -> Result<ExitCode, Failure> {
         Command::Keys(args) => keys::run(args, session).await,
         Command::Report(args) => report::run(args, session).await,
         Command::Demo(args) => demo::run(args, session).await,
+        Command::Lab(args) => lab::run(args, session).await,
+        Command::LabRole { role } => Ok(sdr_lab::bed::play(&role)),
         Command::Sim(args) => sim::run(args, session),
         Command::Completions(args) => completions::run::<Cli>(args, session),
     }

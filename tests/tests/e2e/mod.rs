@@ -4,4 +4,5 @@ mod by_hand;
 mod demo;
 mod garbage;
 mod keys;
+mod lab;
 mod role;

@@ -16,5 +16,5 @@ mod awaited;
 mod describe;
 mod duration;
 mod last_words;
-mod problems;
+pub(crate) mod problems;
 mod role_move;

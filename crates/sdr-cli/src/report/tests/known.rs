@@ -52,6 +52,7 @@ pub(crate) fn extra() -> Extra {
         position_topic: Some("/exploration/position/odometry".to_owned()),
         pictures: None,
         danger_topic: Some("/exploration/anomaly/danger".to_owned()),
+        lab: None,
         truth: truth.collect(),
         commands_ns: commands.collect(),
         detector: Some(Detector {
