@@ -121,6 +121,25 @@ fn the_old_home_goes_on_until_the_new_one_is_heard() {
 }
 
 #[test]
+fn what_must_be_apart_stays_apart_whichever_of_the_two_says_so() {
+    let mut fleet = Fleet::new(3, 31);
+    (0..3).for_each(|number| fleet.set_rssi(number, -47.0));
+    fleet.run(Duration::from_secs(2));
+    let mut pair = exploration();
+    pair.components.truncate(2);
+    pair.connections.truncate(1);
+    pair.components[1].place.apart_from.push(pair.components[0].name.clone());
+    fleet.deploy(0, &pair);
+    fleet.run_until(LONG, "all active", |fleet| fleet.is_running("exploration"));
+    assert_eq!(fleet.home("exploration", "anomaly").as_deref(), Some("robot-2"));
+
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "moved", |fleet| !fleet.events("moved").is_empty());
+
+    assert_eq!(fleet.home("exploration", "fisheye").as_deref(), Some("robot-3"));
+}
+
+#[test]
 fn nothing_comes_back_by_itself_when_the_radio_is_fine_again() {
     let mut fleet = deployed(3);
     fleet.set_rssi(0, -55.0);

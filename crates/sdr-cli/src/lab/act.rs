@@ -5,12 +5,17 @@ use std::{process::Stdio, time::Duration};
 use sdr_core::id::RobotId;
 use sdr_files::{
     Scenario,
-    scenario::{Action, Blow, Target},
+    scenario::{Action, Blow, Cut, Target},
 };
 use sdr_lab::bed::{BedError, Whom};
 use tokio::process::{Child, Command};
 
-use super::{config::index_of, deeds, eyes::Eyes, fleet::Fleet};
+use super::{
+    config::index_of,
+    deeds,
+    eyes::{Eyes, Seen},
+    fleet::Fleet,
+};
 use crate::failure::Failure;
 
 /// Something that is due later because of what was done.
@@ -23,6 +28,9 @@ pub(super) enum Later {
     /// These robots have power again.
     PowerOn(Vec<usize>),
 }
+
+/// What is due later, and after which time.
+pub(super) type Due = Option<(Duration, Later)>;
 
 /// An operator's command that runs.
 pub(super) struct Running {
@@ -49,12 +57,7 @@ impl Hands<'_> {
     }
 
     /// Does it; what it entails comes with the time after which it is due.
-    pub(super) fn act(
-        &mut self,
-        line: u32,
-        action: &Action,
-        eyes: &Eyes,
-    ) -> Result<Option<(Duration, Later)>, Failure> {
+    pub(super) fn act(&mut self, line: u32, action: &Action, eyes: &Eyes) -> Result<Due, Failure> {
         let now = self.fleet.bed.now();
         let mut later = None;
         match action {
@@ -70,16 +73,10 @@ impl Hands<'_> {
                 self.fleet.bed.air.lock().place(now, self.index(robot), to, *over);
             }
             Action::Outage(robots, cut, lasting) => {
-                let robots = self.indices(robots);
-                for robot in &robots {
-                    self.fleet.bed.air.lock().deafen(*robot, Some(deeds::deaf(*cut)));
-                }
-                later = lasting.map(|lasting| (lasting, Later::Hear(robots)));
+                later = self.outage(self.indices(robots), *cut, *lasting);
             }
             Action::Split(name, inside, lasting) => {
-                let inside = self.indices(inside);
-                let inside = (0..self.scenario.robots.len()).map(|robot| inside.contains(&robot));
-                self.fleet.bed.air.lock().split(name, inside.collect());
+                self.split(name, &self.indices(inside));
                 later = lasting.map(|lasting| (lasting, Later::Heal(name.clone())));
             }
             Action::Heal(name) => self.heal(name),
@@ -101,13 +98,7 @@ impl Hands<'_> {
             Action::Signal(target, blow) => self.signal(target, *blow)?,
             Action::Start(robot) => self.start(self.index(robot), eyes)?,
             Action::Power(robots, back_after) => {
-                let robots = self.indices(robots);
-                for robot in &robots {
-                    self.fleet.bed.robots[*robot].power_off();
-                    self.fleet.agents_on[*robot] = false;
-                    eyes.seen().forget(*robot);
-                }
-                later = back_after.map(|time| (time, Later::PowerOn(robots)));
+                later = self.power_off(self.indices(robots), *back_after, eyes);
             }
             Action::PowerOn(robots) => self.power_on(&self.indices(robots), eyes)?,
             Action::DiskFull(robot, full) => {
@@ -120,7 +111,7 @@ impl Hands<'_> {
                 self.fleet.bed.robots[robot].slow(*delay).map_err(tell)?;
             }
             Action::Faulty(component, robot, order) => {
-                self.order(component, robot.as_ref(), order)?;
+                self.order(component, robot.as_ref(), order, eyes)?;
             }
             Action::Sdr { robot, words, fails } => self.operate(line, robot, words, *fails)?,
             // Judged, not done.
@@ -141,6 +132,27 @@ impl Hands<'_> {
             Later::PowerOn(robots) => self.power_on(robots, eyes)?,
         }
         Ok(())
+    }
+
+    fn outage(&self, robots: Vec<usize>, cut: Cut, lasting: Option<Duration>) -> Due {
+        for robot in &robots {
+            self.fleet.bed.air.lock().deafen(*robot, Some(deeds::deaf(cut)));
+        }
+        lasting.map(|lasting| (lasting, Later::Hear(robots)))
+    }
+
+    fn split(&self, name: &str, inside: &[usize]) {
+        let inside = (0..self.scenario.robots.len()).map(|robot| inside.contains(&robot));
+        self.fleet.bed.air.lock().split(name, inside.collect());
+    }
+
+    fn power_off(&mut self, robots: Vec<usize>, back_after: Option<Duration>, eyes: &Eyes) -> Due {
+        for robot in &robots {
+            self.fleet.bed.robots[*robot].power_off();
+            self.fleet.agents_on[*robot] = false;
+            eyes.seen().forget(*robot);
+        }
+        back_after.map(|time| (time, Later::PowerOn(robots)))
     }
 
     fn heal(&self, name: &str) {
@@ -188,21 +200,31 @@ impl Hands<'_> {
     }
 
     fn power_on(&mut self, robots: &[usize], eyes: &Eyes) -> Result<(), Failure> {
-        for robot in robots
-            .iter()
-            .filter(|robot| !self.fleet.bed.robots[**robot].is_on())
-            .copied()
-            .collect::<Vec<_>>()
-        {
-            self.start(robot, eyes)?;
+        for robot in robots {
+            if !self.fleet.bed.robots[*robot].is_on() {
+                self.start(*robot, eyes)?;
+            }
         }
         Ok(())
     }
 
-    /// Leaves the order where the component looks for it.
-    fn order(&self, component: &str, robot: Option<&RobotId>, order: &str) -> Result<(), Failure> {
+    /// Leaves the order where the component looks for it: on that robot, else at its home; one for
+    /// always lies everywhere.
+    fn order(
+        &self,
+        component: &str,
+        robot: Option<&RobotId>,
+        order: &str,
+        eyes: &Eyes,
+    ) -> Result<(), Failure> {
+        let everywhere = order.split_whitespace().last() == Some("always");
+        let seen = eyes.seen();
         for (index, places) in self.fleet.places.iter().enumerate() {
-            if robot.is_some_and(|robot| self.index(robot) != index) {
+            let meant = match robot {
+                Some(robot) => self.index(robot) == index,
+                None => everywhere || is_home(&seen, index, component),
+            };
+            if !meant {
                 continue;
             }
             let path = places.orders.join(component);
@@ -235,6 +257,15 @@ impl Hands<'_> {
         self.commands.push(Running { line, words: words.join(" "), fails, child });
         Ok(())
     }
+}
+
+/// Whether a robot says that it is a component's home.
+fn is_home(seen: &Seen, robot: usize, component: &str) -> bool {
+    let Some(view) = seen.view(robot) else { return false };
+    let components = view.systems.iter().flat_map(|system| &system.components);
+    components
+        .filter(|one| one.name == component)
+        .any(|one| one.home.as_deref() == Some(view.seen_from.as_str()))
 }
 
 fn tell(error: BedError) -> Failure {

@@ -152,7 +152,14 @@ fn recorded(
                 None => (false, format!("no sample of {connection} was recorded")),
             }
         }
-        _ => (false, "not judged from recordings".to_owned()),
+        Wanted::Home(..)
+        | Wanted::State(..)
+        | Wanted::Coordinator(..)
+        | Wanted::Coordinators(_)
+        | Wanted::Seen(..)
+        | Wanted::Running
+        | Wanted::Unchanged
+        | Wanted::Event(_) => (false, "not judged from recordings".to_owned()),
     };
     let expected = judged::words(expectation);
     Verdict { line: step.line, expected, met, took_ms: None, found }

@@ -31,13 +31,13 @@ const NEEDS: &str = "\n  the lab makes network, mount and process namespaces and
 /// See the module. Fields are dropped in this order.
 pub(super) struct Fleet {
     pub(super) bed: Bed,
-    world: Option<WorldHandle>,
+    _world: Option<WorldHandle>,
     pub(super) places: Vec<Places>,
     /// Robots whose agent should be running.
     pub(super) agents_on: Vec<bool>,
     program: Program,
     _lock: fs::File,
-    folder: Folder,
+    _folder: Folder,
 }
 
 impl Fleet {
@@ -84,14 +84,10 @@ impl Fleet {
             log: path.to_owned(),
         };
         let agents_on = vec![false; count];
-        let fleet = Self { bed, world, places, agents_on, program, _lock: lock, folder };
+        let fleet =
+            Self { bed, _world: world, places, agents_on, program, _lock: lock, _folder: folder };
         fleet.set_up_radio(scenario);
         Ok(fleet)
-    }
-
-    /// Its folder.
-    pub(super) fn folder(&self) -> &Path {
-        self.folder.path()
     }
 
     /// Switches a robot on and starts its agent.
@@ -127,11 +123,6 @@ impl Fleet {
             }
             robot.power_off();
         }
-    }
-
-    /// The robot in the world whose wheels are used.
-    pub(super) fn world(&self) -> Option<&WorldHandle> {
-        self.world.as_ref()
     }
 
     fn set_up_radio(&self, scenario: &Scenario) {

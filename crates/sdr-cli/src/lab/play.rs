@@ -139,6 +139,7 @@ impl<'a> Play<'a> {
     /// The timeline, from time 0 on.
     async fn run(&mut self) -> Result<(), Failure> {
         self.start = Instant::now();
+        let start_ns = monotonic_ns();
         let scenario = self.scenario();
         let mut steps = scenario.steps.iter().peekable();
         let mut later: BTreeMap<(Duration, u64), Later> = BTreeMap::new();
@@ -148,7 +149,8 @@ impl<'a> Play<'a> {
             while let Some(step) = steps.next_if(|step| step.at <= now) {
                 let text = deeds::words(&step.what);
                 match &step.what {
-                    Action::Expect(_) => self.judged.begin(step, monotonic_ns()),
+                    // From the moment it is meant, not from when we got to it.
+                    Action::Expect(_) => self.judged.begin(step, start_ns + whole_ns(step.at)),
                     _ => self.tell(text)?,
                 }
                 let did = self.hands.act(step.line, &step.what, &self.eyes);
@@ -291,6 +293,10 @@ pub(super) fn verdict_words(verdict: &Verdict) -> String {
     let took =
         verdict.took_ms.map(|ms| format!(" (after {:.2} s)", ms / 1000.0)).unwrap_or_default();
     format!("{word} {}{took}: {}", verdict.expected, verdict.found)
+}
+
+fn whole_ns(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }
 
 pub(super) fn rounded(seconds: f64) -> f64 {

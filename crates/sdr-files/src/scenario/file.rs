@@ -270,7 +270,7 @@ table! {
     pub(crate) struct FaultyTable {
         /// Its name in the system.
         component: At<Name>,
-        /// Only there; default: wherever it runs.
+        /// Only there; default: at its home; with `always` everywhere.
         robot: Option<At<RobotId>>,
         /// What it does, in the words of its README.
         order: At<String>,

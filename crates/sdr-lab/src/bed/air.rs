@@ -58,6 +58,15 @@ pub struct Traffic {
     pub queue_dropped_frames: u64,
 }
 
+/// A frame that has reached the access point.
+#[derive(Clone, Copy, Debug)]
+struct Sent {
+    at: Duration,
+    from: usize,
+    bytes: usize,
+    all: bool,
+}
+
 /// See the module.
 #[derive(Debug)]
 pub struct Air {
@@ -173,7 +182,7 @@ impl Air {
         };
         let mut arrivals = Vec::new();
         for robot in receivers {
-            match self.receive(sent_at, from, robot, bytes, all) {
+            match self.receive(&Sent { at: sent_at, from, bytes, all }, robot) {
                 Some(at) => {
                     self.traffic[robot].received_frames += 1;
                     arrivals.push((robot, at));
@@ -189,14 +198,8 @@ impl Air {
     }
 
     /// The way down from the access point.
-    fn receive(
-        &mut self,
-        sent_at: Duration,
-        from: usize,
-        to: usize,
-        bytes: usize,
-        all: bool,
-    ) -> Option<Duration> {
+    fn receive(&mut self, sent: &Sent, to: usize) -> Option<Duration> {
+        let Sent { at: sent_at, from, bytes, all } = *sent;
         let down = self.links[to].sending(sent_at, bytes, all);
         let hears = !matches!(self.deaf[to], Some(Deaf::Both | Deaf::In));
         let apart = self.walls.iter().any(|(_, inside)| inside[from] != inside[to]);

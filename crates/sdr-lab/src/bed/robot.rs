@@ -262,9 +262,9 @@ fn receive_descriptor(socket: &UnixStream) -> Option<OwnedFd> {
     let flags = RecvFlags::CMSG_CLOEXEC;
     let received = recvmsg(socket.as_fd(), &mut data, &mut control, flags).ok()?;
     let messages = control.drain().filter(|_| received.bytes > 0);
-    let mut descriptors = messages.filter_map(|message| match message {
-        RecvAncillaryMessage::ScmRights(descriptors) => Some(descriptors),
-        _ => None,
+    let mut descriptors = messages.filter_map(|message| {
+        let RecvAncillaryMessage::ScmRights(descriptors) = message else { return None };
+        Some(descriptors)
     });
     descriptors.next()?.next()
 }

@@ -1,7 +1,7 @@
 //! A slow disk: every call that waits for it waits longer.
 
 use std::{
-    io,
+    fs, io,
     os::fd::OwnedFd,
     sync::{
         Arc,
@@ -48,10 +48,12 @@ impl Disk {
 fn serve(listener: &OwnedFd, delay_ns: &AtomicU64) {
     loop {
         match sys::next_sync(listener) {
-            Ok(id) => {
-                thread::sleep(Duration::from_nanos(delay_ns.load(Ordering::Relaxed)));
+            Ok(call) => {
+                if is_on_disk(&call) {
+                    thread::sleep(Duration::from_nanos(delay_ns.load(Ordering::Relaxed)));
+                }
                 // Its process may have ended meanwhile.
-                let _ = sys::let_go(listener, id);
+                let _ = sys::let_go(listener, call.id);
             }
             // One that ended before it was told of; the next call is another.
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
@@ -59,4 +61,10 @@ fn serve(listener: &OwnedFd, delay_ns: &AtomicU64) {
             Err(_) => return,
         }
     }
+}
+
+/// Shared memory has no platter.
+fn is_on_disk(call: &sys::Held) -> bool {
+    let link = format!("/proc/{}/fd/{}", call.pid, call.descriptor);
+    fs::read_link(link).is_ok_and(|path| !path.starts_with("/dev/shm"))
 }

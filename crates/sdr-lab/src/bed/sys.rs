@@ -225,15 +225,25 @@ pub(super) fn hold_syncs() -> io::Result<OwnedFd> {
     }
 }
 
-/// Waits for the next call that is held, and gives its number.
-pub(super) fn next_sync(listener: &OwnedFd) -> io::Result<u64> {
+/// A call that is held.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    pub(super) id: u64,
+    /// Whose, in this tree of processes.
+    pub(super) pid: u32,
+    /// Of which file.
+    pub(super) descriptor: u64,
+}
+
+/// Waits for the next call that is held.
+pub(super) fn next_sync(listener: &OwnedFd) -> io::Result<Held> {
     // SAFETY: plain data of the kernel, which wants it zeroed.
     let mut call: libc::seccomp_notif = unsafe { zeroed() };
     // SAFETY: the request writes one seccomp_notif, which lives until the call returns.
     told(unsafe {
         libc::ioctl(listener.as_raw_fd(), libc::SECCOMP_IOCTL_NOTIF_RECV, from_mut(&mut call))
     })?;
-    Ok(call.id)
+    Ok(Held { id: call.id, pid: call.pid, descriptor: call.data.args[0] })
 }
 
 /// Lets a held call go on.
