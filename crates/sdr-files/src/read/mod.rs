@@ -91,6 +91,11 @@ impl Reader {
         self.problems.is_empty()
     }
 
+    /// Whether something on this line was told: what follows from it needs no words of its own.
+    pub(crate) fn has_told(&self, line: u32) -> bool {
+        self.problems.iter().any(|problem| problem.line == line)
+    }
+
     /// The text of `node`.
     pub(crate) fn text<'n>(&mut self, node: &'n Node, allowed: &str) -> Option<&'n str> {
         match &node.body {

@@ -25,6 +25,7 @@ pub(super) fn checked(at: &At<ExpectTable>, context: &mut Context<'_>) -> Option
         (None, None) if matches!(what, Some(Wanted::Lost(..) | Wanted::Pause(..))) => {
             When::Within(Duration::ZERO)
         }
+        (None, None) | (Some(_), Some(_)) if context.reader.has_told(at.mark.line) => return None,
         (None, None) | (Some(_), Some(_)) => {
             let help =
                 "allowed: `within` (at some moment) or `lasting` (at every moment)".to_owned();
@@ -79,6 +80,9 @@ fn subject(at: &At<ExpectTable>, context: &mut Context<'_>) -> Option<Wanted> {
         found.push(Some(Wanted::Pause(connection.value.clone(), most.value)));
     }
     if found.len() != 1 {
+        if context.reader.has_told(at.mark.line) {
+            return None;
+        }
         let message = format!("an expectation with {} subjects", found.len());
         context.reader.problem(at.mark, message, Some(SUBJECTS.to_owned()));
         return None;
@@ -101,8 +105,10 @@ fn of_component(
         }
         (None, None, Some(state)) => Some(Wanted::State(component, state.value.0)),
         _ => {
-            let message = "it is not clear what is expected of the component";
-            context.reader.problem(at.mark, message, Some(SUBJECTS.to_owned()));
+            if !context.reader.has_told(at.mark.line) {
+                let message = "it is not clear what is expected of the component";
+                context.reader.problem(at.mark, message, Some(SUBJECTS.to_owned()));
+            }
             None
         }
     }

@@ -72,6 +72,9 @@ pub(super) fn checked(entry: &At<StepTable>, context: &mut Context<'_>) -> Optio
         .as_ref()
         .map(|one| expect::checked(one, context).map(|wanted| Action::Expect(Box::new(wanted)))));
     if found.len() != 1 {
+        if context.reader.has_told(entry.mark.line) {
+            return None;
+        }
         let message = format!("a step with {} things that happen", found.len());
         let help = "allowed: `at` and exactly one of link, move, outage, split, heal, battery, memory, \
                     cpu, signal, start, power_off, power_on, disk, faulty, sdr, expect";

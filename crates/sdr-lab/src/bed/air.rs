@@ -17,6 +17,8 @@ use crate::sim::Chance;
 
 /// Tries of a frame to one receiver.
 const TRIES_MAX: u32 = 7;
+/// Frames of one turn (A-MPDU).
+const TURN_FRAMES_MAX: u32 = 32;
 /// Preamble, spaces between frames and the acknowledgement.
 const OVERHEAD: Duration = Duration::from_micros(100);
 /// Bytes that 802.11 adds to a frame of Ethernet.
@@ -65,6 +67,26 @@ struct Sent {
     from: usize,
     bytes: usize,
     all: bool,
+    /// It did not find the air free.
+    waited: bool,
+}
+
+/// Frames of one link that go in one turn: the back-off and the preamble are paid once.
+#[derive(Clone, Copy, Debug, Default)]
+struct Turn {
+    robot: Option<usize>,
+    frames: u32,
+}
+
+impl Turn {
+    /// Whether a frame of this link begins a new turn. One that `waited` behind others of the same
+    /// link goes with them, as long as the turn is not too long.
+    fn begins(&mut self, robot: usize, waited: bool) -> bool {
+        let goes_on = waited && self.robot == Some(robot) && self.frames < TURN_FRAMES_MAX;
+        self.frames = if goes_on { self.frames + 1 } else { 1 };
+        self.robot = Some(robot);
+        !goes_on
+    }
 }
 
 /// See the module.
@@ -77,6 +99,8 @@ pub struct Air {
     waiting: Vec<VecDeque<(Duration, usize)>>,
     last_arrival: Vec<Vec<Duration>>,
     free_at: Duration,
+    /// Frames that go up, and down, in one turn.
+    turns: (Turn, Turn),
     traffic: Vec<Traffic>,
     chance: Chance,
 }
@@ -92,6 +116,7 @@ impl Air {
             waiting: vec![VecDeque::new(); robots],
             last_arrival: vec![vec![Duration::ZERO; robots]; robots],
             free_at: Duration::ZERO,
+            turns: (Turn::default(), Turn::default()),
             traffic: vec![Traffic::default(); robots],
             chance: Chance::stream(seed, 0),
         }
@@ -167,13 +192,15 @@ impl Air {
         if receivers.iter().any(|robot| *robot >= self.links.len()) {
             return Vec::new();
         }
+        let waited = self.free_at > now;
         if !self.finds_room(now, from, bytes) {
             self.traffic[from].queue_dropped_frames += 1;
             return Vec::new();
         }
         let up = self.links[from].sending(now, bytes, false);
         let up = up.filter(|_| !matches!(self.deaf[from], Some(Deaf::Both | Deaf::Out)));
-        let sent_at = self.transmit(now, up, bytes);
+        let first = self.turns.0.begins(from, waited);
+        let sent_at = self.transmit(now, up, bytes, first);
         let done = self.free_at;
         self.waiting[from].push_back((done, bytes));
         let Some(sent_at) = sent_at else {
@@ -182,7 +209,7 @@ impl Air {
         };
         let mut arrivals = Vec::new();
         for robot in receivers {
-            match self.receive(&Sent { at: sent_at, from, bytes, all }, robot) {
+            match self.receive(&Sent { at: sent_at, from, bytes, all, waited }, robot) {
                 Some(at) => {
                     self.traffic[robot].received_frames += 1;
                     arrivals.push((robot, at));
@@ -209,7 +236,8 @@ impl Air {
             let down = down.filter(|sending| !self.chance.happens(sending.try_loss))?;
             sent_at + airtime(bytes, down.bits_per_second)
         } else {
-            self.transmit(sent_at, down, bytes)?
+            let first = self.turns.1.begins(to, sent.waited);
+            self.transmit(sent_at, down, bytes, first)?
         };
         if self.links[from].swallows(at) | self.links[to].swallows(at) {
             return None;
@@ -227,15 +255,20 @@ impl Air {
         now: Duration,
         sending: Option<Sending>,
         bytes: usize,
+        first: bool,
     ) -> Option<Duration> {
         // Without an access point nothing is sent and no air is taken.
         let way = sending?;
         let mut at = self.free_at.max(now);
         let mut slots = SLOTS.0;
         let mut heard = false;
-        for _ in 0..TRIES_MAX {
-            at += SLOT.mul_f64(self.chance.uniform() * f64::from(slots));
-            at += airtime(bytes, way.bits_per_second);
+        for number in 0..TRIES_MAX {
+            let airtime = airtime(bytes, way.bits_per_second);
+            if first || number > 0 {
+                at += SLOT.mul_f64(self.chance.uniform() * f64::from(slots)) + airtime;
+            } else {
+                at += airtime - OVERHEAD;
+            }
             slots = (2 * slots + 1).min(SLOTS.1);
             if !self.chance.happens(way.try_loss) {
                 heard = true;

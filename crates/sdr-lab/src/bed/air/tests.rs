@@ -104,6 +104,21 @@ fn a_full_queue_drops_and_a_slow_link_fills_it() {
 }
 
 #[test]
+fn frames_that_wait_go_in_one_turn_and_a_stream_gets_through() {
+    let mut air = Air::new(2, 1);
+    let roomy = LinkChange { queue_bytes: Some(1 << 24), ..LinkChange::default() };
+    change(&mut air, 0, &roomy);
+
+    let last = (0..1000).filter_map(|_| {
+        air.send(seconds(1.0), 0, Receiver::One(1), 1500).first().map(|(_, at)| *at)
+    });
+
+    // 1.5 MB over two hops at 65 Mbit/s: 369 ms of payload and 32 turns' worth of the rest.
+    let took = last.max().unwrap() - seconds(1.0);
+    assert!(took > seconds(0.37) && took < seconds(0.42), "{took:?}");
+}
+
+#[test]
 fn whoever_is_cut_off_hears_nothing_or_is_not_heard() {
     let mut air = Air::new(2, 1);
     for (deaf, robot, hears) in [
