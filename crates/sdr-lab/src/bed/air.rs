@@ -226,7 +226,7 @@ impl Air {
 
     /// The way down from the access point.
     fn receive(&mut self, sent: &Sent, to: usize) -> Option<Duration> {
-        let Sent { at: sent_at, from, bytes, all } = *sent;
+        let Sent { at: sent_at, from, bytes, all, waited } = *sent;
         let down = self.links[to].sending(sent_at, bytes, all);
         let hears = !matches!(self.deaf[to], Some(Deaf::Both | Deaf::In));
         let apart = self.walls.iter().any(|(_, inside)| inside[from] != inside[to]);
@@ -236,7 +236,7 @@ impl Air {
             let down = down.filter(|sending| !self.chance.happens(sending.try_loss))?;
             sent_at + airtime(bytes, down.bits_per_second)
         } else {
-            let first = self.turns.1.begins(to, sent.waited);
+            let first = self.turns.1.begins(to, waited);
             self.transmit(sent_at, down, bytes, first)?
         };
         if self.links[from].swallows(at) | self.links[to].swallows(at) {
