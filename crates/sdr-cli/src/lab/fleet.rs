@@ -18,7 +18,6 @@ use sdr_lab::{
 use super::{
     config::{self, Places, RESERVE_BYTES},
     deeds::link_change,
-    leftovers,
 };
 use crate::{demo::Folder, failure::Failure, locate};
 
@@ -36,7 +35,6 @@ pub(super) struct Fleet {
     /// Robots whose agent should be running.
     pub(super) agents_on: Vec<bool>,
     program: Program,
-    _lock: fs::File,
     _folder: Folder,
 }
 
@@ -44,10 +42,7 @@ impl Fleet {
     /// Makes everything and starts no agent.
     pub(super) fn build(scenario: &Scenario, seed: u64) -> Result<Self, Failure> {
         let (program, programs) = (locate::agent()?, locate::folder()?);
-        leftovers::remove(&std::env::temp_dir());
-        let folder = Folder::new(leftovers::PREFIX)?;
-        let lock =
-            leftovers::hold(folder.path()).map_err(|error| tell("lock its folder", &error))?;
+        let folder = Folder::new("sdr-lab-")?;
         let path = folder.path();
         let count = scenario.robots.len();
         let places: Vec<Places> = (0..count).map(|index| Places::new(path, index)).collect();
@@ -84,8 +79,7 @@ impl Fleet {
             log: path.to_owned(),
         };
         let agents_on = vec![false; count];
-        let fleet =
-            Self { bed, _world: world, places, agents_on, program, _lock: lock, _folder: folder };
+        let fleet = Self { bed, _world: world, places, agents_on, program, _folder: folder };
         fleet.set_up_radio(scenario);
         Ok(fleet)
     }

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Whatever way it ends, dropping [`fleet::Fleet`] leaves no process, no namespace and no folder; what a run that
-//! was killed left is removed by the next ([`leftovers`]).
+//! was killed left is removed by the next.
 
 mod act;
 mod answer;
@@ -18,7 +18,6 @@ mod finish;
 mod fleet;
 mod judge;
 mod judged;
-mod leftovers;
 mod play;
 
 pub(crate) use self::{answer::Told, judged::Verdict};
