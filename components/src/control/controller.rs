@@ -28,6 +28,8 @@ pub struct Settings {
     pub danger_hold: Duration,
     /// A pose older than this is no pose.
     pub stale_after: Duration,
+    /// A detector that was heard and then says nothing for so long is blind.
+    pub danger_stale_after: Duration,
 }
 
 impl Settings {
@@ -41,6 +43,7 @@ impl Settings {
             turn_change_max: 4.0,
             danger_hold: Duration::from_secs(1),
             stale_after: Duration::from_millis(500),
+            danger_stale_after: Duration::from_secs(1),
         }
     }
 
@@ -54,6 +57,7 @@ impl Settings {
             ("turn_change_max", self.turn_change_max, 0.1, 100.0),
             ("danger_hold", self.danger_hold.as_secs_f64(), 0.0, 60.0),
             ("stale_after", self.stale_after.as_secs_f64(), 0.05, 10.0),
+            ("danger_stale_after", self.danger_stale_after.as_secs_f64(), 0.05, 10.0),
         ];
         for (name, value, low, high) in rules {
             if !(low..=high).contains(&value) {
@@ -86,6 +90,8 @@ pub enum Verdict {
     Drive,
     /// The dangerous object is seen, or was a moment ago.
     Danger,
+    /// The detector was heard before and says nothing now: what is ahead is not known.
+    Blind,
     /// There is no fresh pose.
     NoPose,
     /// The pose is outside the area.
@@ -124,6 +130,8 @@ pub struct Controller {
     settings: Settings,
     guide: Guide,
     danger_until: Option<Duration>,
+    /// When the detector was last heard, whatever it said.
+    detector_at: Option<Duration>,
     pose: Option<(Duration, Pose)>,
     ordered: Option<Duration>,
     linear: f64,
@@ -139,6 +147,7 @@ impl Controller {
             settings,
             guide,
             danger_until: None,
+            detector_at: None,
             pose: None,
             ordered: None,
             linear: 0.0,
@@ -148,6 +157,7 @@ impl Controller {
 
     /// Takes what the detector says; danger outlasts it by the hold.
     pub fn handle_danger(&mut self, now: Duration, danger: bool) {
+        self.detector_at = Some(now);
         if danger {
             self.danger_until = Some(now + self.settings.danger_hold);
         }
@@ -209,6 +219,10 @@ impl Controller {
     fn verdict(&self, now: Duration) -> Verdict {
         if self.danger_until.is_some_and(|until| now < until) {
             return Verdict::Danger;
+        }
+        let silent = |at: Duration| now.saturating_sub(at) > self.settings.danger_stale_after;
+        if self.detector_at.is_some_and(silent) {
+            return Verdict::Blind;
         }
         match self.pose {
             Some((at, pose)) if now.saturating_sub(at) <= self.settings.stale_after => {

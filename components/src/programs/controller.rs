@@ -42,7 +42,7 @@ impl Component for MotionController {
             danger: setup.input("danger")?,
             odometry: setup.input("odometry")?,
             measured: setup.output("wheels")?,
-            command: setup.output("command")?,
+            command: setup.output("command")?.with_safe(&Twist::default())?,
             wheels: Wheels::new(setup.device("wheels")?),
             settings,
             path,
@@ -125,6 +125,10 @@ fn parameters(setup: &mut Setup) -> Result<(Settings, Path), ComponentError> {
     let about = "a pose older than this is none, s";
     let stale = setup.parameter_within("stale_after_s", stale, 0.05..=10.0, about)?;
     settings.stale_after = Duration::from_secs_f64(stale);
+    let stale = settings.danger_stale_after.as_secs_f64();
+    let about = "a detector that was heard and is silent for longer is blind: stop, s";
+    let stale = setup.parameter_within("danger_stale_after_s", stale, 0.05..=10.0, about)?;
+    settings.danger_stale_after = Duration::from_secs_f64(stale);
     let about = "points to drive along, round and round, m; empty for the tunnel's two lanes";
     let way = setup.parameter("path", Vec::<Vec<f64>>::new(), about)?;
     let path = if way.is_empty() {

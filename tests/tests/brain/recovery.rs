@@ -65,6 +65,24 @@ fn the_next_home_is_ready_when_the_time_of_a_condition_is_over() {
 }
 
 #[test]
+fn a_prepared_target_is_connected_and_sent_nothing_until_it_is_home() {
+    let mut fleet = deployed(23);
+    assert_eq!(fleet.robots[0].sends("exploration/fisheye/image"), None);
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "prepared", |fleet| fleet.robots[2].processes().count() == 3);
+    fleet.run(Duration::from_secs(1));
+
+    let story = fleet.story();
+    assert_eq!(fleet.events("condition-raised"), [], "{story}");
+    assert_eq!(fleet.robots[0].sends("exploration/fisheye/image"), Some(false), "{story}");
+    assert_eq!(fleet.robots[0].sends("exploration/anomaly/danger"), Some(true), "{story}");
+    fleet.run_until(LONG, "sent to the new home", |fleet| {
+        fleet.robots[0].sends("exploration/fisheye/image") == Some(true)
+    });
+    fleet.run_until(LONG, "moved", |fleet| fleet.events("moved").len() == 2);
+}
+
+#[test]
 fn what_was_foreseen_and_did_not_come_is_taken_back_without_a_move() {
     let mut fleet = deployed(22);
     fleet.set_rssi(0, -55.0);
@@ -100,6 +118,25 @@ fn the_old_home_goes_on_until_the_new_one_is_heard() {
 }
 
 #[test]
+fn what_must_be_apart_stays_apart_whichever_of_the_two_says_so() {
+    let mut fleet = Fleet::new(3, 31);
+    (0..3).for_each(|number| fleet.set_rssi(number, -47.0));
+    fleet.run(Duration::from_secs(2));
+    let mut pair = exploration();
+    pair.components.truncate(2);
+    pair.connections.truncate(1);
+    pair.components[1].place.apart_from.push(pair.components[0].name.clone());
+    fleet.deploy(0, &pair);
+    fleet.run_until(LONG, "all active", |fleet| fleet.is_running("exploration"));
+    assert_eq!(fleet.home("exploration", "anomaly").as_deref(), Some("robot-2"));
+
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "moved", |fleet| !fleet.events("moved").is_empty());
+
+    assert_eq!(fleet.home("exploration", "fisheye").as_deref(), Some("robot-3"));
+}
+
+#[test]
 fn nothing_comes_back_by_itself_when_the_radio_is_fine_again() {
     let mut fleet = deployed(3);
     fleet.set_rssi(0, -55.0);
@@ -122,9 +159,8 @@ fn a_crash_is_restarted_at_home_under_the_same_epoch_and_a_greater_run() {
     assert_eq!((camera.home.as_deref(), camera.epoch, camera.run), (Some("robot-2"), 1, 2));
     let launches: usize = fleet.robots.iter().map(|robot| robot.launches).sum();
     assert_eq!(launches, 6, "one start for one crash\n{}", fleet.story());
-    let exited = fleet.events("exited")[0].0;
-    let started = fleet.events("started").last().unwrap().0;
-    assert!(started.since(exited) >= Duration::from_millis(200), "the backoff is kept");
+    let restarts = fleet.events("restart");
+    assert_eq!(restarts[0].1.numbers["after_ms"], 0.0, "the first try comes at once");
 }
 
 #[test]

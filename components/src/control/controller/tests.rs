@@ -53,6 +53,7 @@ fn danger_stops_the_rover_until_it_was_away_for_the_hold() {
     controller.handle_danger(ms(2400), true);
     controller.handle_danger(ms(2500), false);
     let held = run(&mut controller, 2400, 3400, HERE);
+    controller.handle_danger(ms(3400), false);
     let after = run(&mut controller, 3400, 4000, HERE);
 
     assert_eq!(stopping[stopping.len() - 1].linear, 0.0);
@@ -62,6 +63,23 @@ fn danger_stops_the_rover_until_it_was_away_for_the_hold() {
     assert!(held.iter().all(|order| order.verdict == Verdict::Danger && order.linear == 0.0));
     assert!(after.iter().all(|order| order.verdict == Verdict::Drive));
     assert!(after[after.len() - 1].linear > 0.2);
+}
+
+#[test]
+fn a_detector_that_falls_silent_stops_the_rover_until_it_speaks_again() {
+    let mut controller = controller();
+    let without = run(&mut controller, 0, 2000, HERE);
+    controller.handle_danger(ms(2000), false);
+
+    let driving = run(&mut controller, 2000, 3020, HERE);
+    let blind = run(&mut controller, 3020, 4000, HERE);
+    controller.handle_danger(ms(4000), false);
+    let after = run(&mut controller, 4000, 4100, HERE);
+
+    assert!(without.iter().chain(&driving).all(|order| order.verdict == Verdict::Drive));
+    assert!(blind.iter().all(|order| order.verdict == Verdict::Blind));
+    assert_eq!(blind[blind.len() - 1].linear, 0.0);
+    assert!(after.iter().all(|order| order.verdict == Verdict::Drive));
 }
 
 #[test]

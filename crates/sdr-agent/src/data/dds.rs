@@ -6,6 +6,7 @@ mod raw;
 use std::{
     cell::RefCell,
     collections::BTreeMap,
+    net::{Ipv4Addr, UdpSocket},
     pin::Pin,
     sync::Arc,
     task::{Context, Poll, Waker},
@@ -33,6 +34,10 @@ use super::{
     transport::{Arrival, EndpointId, Matched, SendError, Topic, Transport, TransportError, Way},
 };
 
+/// Ports of one domain (RTPS 2.3, section 9.6.1.1).
+const DOMAIN_PORTS: u16 = 250;
+/// Port for samples to all, of domain 0.
+const SAMPLES_PORT: u16 = 7401;
 /// Largest body that is surely not fragmented, on links with an MTU of 576 and more.
 const WHOLE_BYTES_MAX: usize = 440;
 /// Samples a reliable writer may have unacknowledged.
@@ -65,14 +70,37 @@ struct Writer {
     unacknowledged_bytes: u64,
 }
 
+/// Holds the port on which a participant would hear samples sent to all, while it is made: it then
+/// announces none, and samples come to it alone.
+///
+/// A writer prefers to send to all when a reader allows it. By Wi-Fi that is the slowest rate and no
+/// retry: pictures that way filled the air and were lost. Discovery has another port and stays as it
+/// is. `None` when somebody else holds the port; then nothing is different from before.
+fn hold_multicast_port(domain_id: u16) -> Option<UdpSocket> {
+    let port = domain_id.checked_mul(DOMAIN_PORTS)?.checked_add(SAMPLES_PORT)?;
+    UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port)).ok()
+}
+
 impl Dds {
-    /// Joins a DDS domain; takes some tens of milliseconds.
-    pub(crate) fn join(domain_id: u16, bell: &Arc<Bell>) -> Result<Self, TransportError> {
+    /// Joins a DDS domain by these addresses of the robot, or by all it has; takes some tens
+    /// of milliseconds.
+    pub(crate) fn join(
+        domain_id: u16,
+        addresses: &[Ipv4Addr],
+        bell: &Arc<Bell>,
+    ) -> Result<Self, TransportError> {
         let failed = |reason: rustdds::dds::CreateError| {
             TransportError::new(format!("join DDS domain {domain_id}"), reason)
         };
         let qos = QosPolicyBuilder::new().build();
-        let participant = DomainParticipantBuilder::new(domain_id).build().map_err(failed)?;
+        let mut builder = DomainParticipantBuilder::new(domain_id);
+        if !addresses.is_empty() {
+            builder = builder.with_only_networks(addresses.iter().copied());
+        }
+        let participant = {
+            let _held = hold_multicast_port(domain_id);
+            builder.build().map_err(failed)?
+        };
         let publisher = participant.create_publisher(&qos).map_err(failed)?;
         let subscriber = participant.create_subscriber(&qos).map_err(failed)?;
         Ok(Self {
@@ -133,17 +161,31 @@ impl Dds {
         }
     }
 
+    /// Writes to all readers at once, or to each by itself where one of them is our own.
     fn write(&mut self, endpoint: EndpointId, sample: &Outgoing) -> Result<(), SendError> {
         let Some(Endpoint::Writer(writer)) = self.endpoints.get_mut(&endpoint) else {
             return Err(SendError::Broken(format!("endpoint {endpoint} is not open for writing")));
         };
-        let options = WriteOptionsBuilder::new()
+        match self.matching.one_by_one(endpoint) {
+            None => writer.write(sample, None),
+            Some(readers) => {
+                readers.iter().try_for_each(|reader| writer.write(sample, Some(*reader)))
+            }
+        }
+    }
+}
+
+impl Writer {
+    fn write(&mut self, sample: &Outgoing, reader: Option<GUID>) -> Result<(), SendError> {
+        let mut options = WriteOptionsBuilder::new()
             .related_sample_identity_opt(sample.related)
-            .source_timestamp(sample.timestamp)
-            .build();
-        match writer.writer.write_with_options(sample.body.clone(), options) {
+            .source_timestamp(sample.timestamp);
+        if let Some(reader) = reader {
+            options = options.to_single_reader(reader);
+        }
+        match self.writer.write_with_options(sample.body.clone(), options.build()) {
             Ok(_) => {
-                writer.unacknowledged_bytes += sample.body.len() as u64;
+                self.unacknowledged_bytes += sample.body.len() as u64;
                 Ok(())
             }
             Err(WriteError::WouldBlock { .. }) => Err(SendError::Backlog),

@@ -24,7 +24,7 @@ mod out_route;
 mod tap;
 mod transport;
 
-use std::{io, sync::Arc, thread};
+use std::{io, net::Ipv4Addr, sync::Arc, thread};
 
 use sdr_component::{
     protocol::SharedMemory,
@@ -49,6 +49,8 @@ pub(crate) struct DataConfig {
     pub(crate) robot: RobotId,
     /// DDS domain of the fleet, 0 to 232.
     pub(crate) domain_id: u16,
+    /// The addresses of this robot that DDS uses; empty: all.
+    pub(crate) addresses: Vec<Ipv4Addr>,
     /// Where this robot's shared memory is.
     pub(crate) memory: SharedMemory,
 }
@@ -83,11 +85,11 @@ impl Data {
     ) -> Result<Self, DataError> {
         let bell = Arc::new(Bell::new()?);
         let (desk, ledger) = (Arc::new(Desk::default()), Arc::new(Ledger::default()));
-        let domain_id = config.domain_id;
+        let (domain_id, addresses) = (config.domain_id, config.addresses);
         let setting = Setting {
             memory: Memory::open(&config.memory, "sdr-agent-data")?,
             robot: config.robot,
-            join: Box::new(move |bell| Ok(Box::new(Dds::join(domain_id, bell)?))),
+            join: Box::new(move |bell| Ok(Box::new(Dds::join(domain_id, &addresses, bell)?))),
             bell: Arc::clone(&bell),
             desk: Arc::clone(&desk),
             ledger: Arc::clone(&ledger),

@@ -85,7 +85,7 @@ impl Robot {
             sink.lock().unwrap().push((sample.port.to_owned(), sample.body.to_vec()));
         });
         let memory = place.memory.clone();
-        let config = DataConfig { robot: robot(name), domain_id, memory };
+        let config = DataConfig { robot: robot(name), domain_id, addresses: Vec::new(), memory };
         let data = Data::start(config, sender, record).unwrap();
         Self { data, inputs, tapped, memory: place.open(), _place: place }
     }

@@ -52,7 +52,8 @@ impl Brain {
                 places.iter().filter(|robot| **robot != self.me).cloned().collect()
             };
             if producers.contains(&self.me) && !far(&consumers).is_empty() {
-                let active = self.forwarded(&producer);
+                let heard = wires.iter().any(|wire| self.runs_afar(&wire.to.component, system));
+                let active = self.forwarded(&producer).filter(|_| heard);
                 routes.push(route(Direction::Out { active }, far(&consumers)));
             }
             if consumers.contains(&self.me) && !far(&producers).is_empty() {
@@ -73,6 +74,14 @@ impl Brain {
         });
         places.extend(draining);
         places
+    }
+
+    /// Whether a consumer runs on another robot. One that only stands by there is connected,
+    /// but it would throw away what it is sent, and the radio has better things to carry.
+    fn runs_afar(&self, consumer: &Name, system: &SystemNow) -> bool {
+        let Some((_, assignment)) = self.wanted(&system.key(consumer)) else { return false };
+        let mut running = assignment.drains.iter().chain([&assignment.home]);
+        running.any(|robot| *robot != self.me)
     }
 
     /// The token whose samples go out from here: that of the home, or of the old home while

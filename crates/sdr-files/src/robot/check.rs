@@ -5,15 +5,15 @@ use std::{path::PathBuf, time::Duration};
 use sdr_core::{
     id::{Name, NameError, RobotId},
     report::RolePreference,
-    spec::PortRef,
+    spec::{OnAgentDeath, PortRef},
     units::Bytes,
 };
 
 use super::{
     config::{
-        ApiConfig, CapacityConfig, ComponentsConfig, DeviceConfig, LogConfig, LogFormat,
-        LogsConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig, RosConfig,
-        SensorsConfig, StorageConfig, SystemPort,
+        ApiConfig, CapacityConfig, Cgroup, ComponentsConfig, DeviceConfig, LogConfig, LogFormat,
+        LogsConfig, RadioConfig, RecordingsConfig, RobotConfig, RosConfig, SensorsConfig,
+        StorageConfig, SystemPort,
     },
     file::{
         CapacityTable, ComponentsTable, Devices, LogTable, RadioMode, RadioTable, RecordingsEntry,
@@ -21,15 +21,13 @@ use super::{
     },
     mesh::{api_listen, bounded, mesh},
     places::Places,
+    ros::ros,
     sources::{BatterySource, PositionSource, RssiEntry, RssiSource, SensorEntry},
 };
 use crate::{
     problem::Mark,
     read::{At, Reader},
 };
-
-/// Highest DDS domain whose ports are below 65536.
-const DOMAIN_MAX: u16 = 232;
 
 /// The checked configuration; every problem is told to `reader`.
 pub(super) fn checked(
@@ -42,9 +40,7 @@ pub(super) fn checked(
     let capacity = capacity(file.capacity, reader);
     let radio = radio(file.radio, places, reader);
     let sensors = file.sensors.map(|table| sensors(table, places, reader)).unwrap_or_default();
-    let domain_id = file.ros.and_then(|table| table.domain_id);
-    let ros =
-        RosConfig { domain_id: domain_id.map_or(0, |domain| self::domain_id(&domain, reader)) };
+    let ros = file.ros.map(|table| ros(table, reader)).unwrap_or_default();
     let preference = file.coordinator.and_then(|table| table.preference);
     let (socket, listen) = file.api.map_or((None, None), |table| (table.socket, table.listen));
     let api = ApiConfig {
@@ -72,12 +68,17 @@ pub(super) fn checked(
 }
 
 fn components(table: Option<ComponentsTable>, places: &Places) -> ComponentsConfig {
-    let (path, on_agent_death) =
-        table.map_or((None, None), |table| (table.path, table.on_agent_death));
+    let (path, on_agent_death, cgroup) =
+        table.map_or((None, None, None), |table| (table.path, table.on_agent_death, table.cgroup));
     let path = path.map(|path| path.value).unwrap_or_default();
     ComponentsConfig {
         path: path.iter().map(|at| places.resolve(&at.value)).collect(),
         on_agent_death: on_agent_death.map_or(OnAgentDeath::Keep, |at| at.value),
+        cgroup: match cgroup.as_ref().map(|at| at.value.as_str()) {
+            None | Some("auto") => Cgroup::Auto,
+            Some("off") => Cgroup::Off,
+            Some(folder) => Cgroup::Below(places.resolve(folder)),
+        },
     }
 }
 
@@ -199,14 +200,6 @@ fn system_port(at: &At<String>, reader: &mut Reader) -> Option<SystemPort> {
         Ok(SystemPort { system: Name::new(system)?, port })
     };
     made().map_err(|error| reader.problem(at.mark, error.to_string(), None)).ok()
-}
-
-fn domain_id(domain: &At<u16>, reader: &mut Reader) -> u16 {
-    if domain.value > DOMAIN_MAX {
-        let message = format!("DDS has no domain {}", domain.value);
-        reader.problem(domain.mark, message, Some(format!("allowed: 0 to {DOMAIN_MAX}")));
-    }
-    domain.value
 }
 
 fn storage(table: Option<StorageTable>, places: &Places, reader: &mut Reader) -> StorageConfig {

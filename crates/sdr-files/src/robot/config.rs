@@ -1,11 +1,16 @@
 //! robot.toml after all checks.
 
-use std::{fmt, net::SocketAddr, path::PathBuf, time::Duration};
+use std::{
+    fmt,
+    net::{Ipv4Addr, SocketAddr},
+    path::PathBuf,
+    time::Duration,
+};
 
 use sdr_core::{
     id::{Name, RobotId},
     report::RolePreference,
-    spec::PortRef,
+    spec::{OnAgentDeath, PortRef},
     units::{Bytes, Permille},
 };
 
@@ -118,25 +123,31 @@ pub struct SensorsConfig {
 pub struct ComponentsConfig {
     /// Folders with executables, in this order; empty means beside the agent.
     pub path: Vec<PathBuf>,
-    /// What becomes of components when the agent dies.
+    /// What becomes of components when the agent dies, unless their system says otherwise.
     pub on_agent_death: OnAgentDeath,
+    /// Where limits are enforced.
+    pub cgroup: Cgroup,
 }
 
-/// What becomes of components when the agent dies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OnAgentDeath {
-    /// They go on. A restarted agent of this version ends what its predecessor left and
-    /// starts it anew.
-    Keep,
-    /// They end with the agent.
-    Stop,
+/// Where limits of components are enforced.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Cgroup {
+    /// Beside the agent's own group, when that was delegated as a subgroup `agent`; else by
+    /// rlimits.
+    Auto,
+    /// Nowhere: by rlimits.
+    Off,
+    /// Below this folder of the cgroup v2 file system, which the agent's user may write.
+    Below(PathBuf),
 }
 
 /// ROS 2.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RosConfig {
     /// DDS domain, 0..=232.
     pub domain_id: u16,
+    /// The addresses by which samples cross; empty: all that the robot has.
+    pub addresses: Vec<Ipv4Addr>,
 }
 
 /// The API.

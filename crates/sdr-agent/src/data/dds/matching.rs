@@ -11,6 +11,8 @@ pub(super) struct Matching {
     participant: GUID,
     ours: BTreeMap<GUID, EndpointId>,
     remote: BTreeMap<EndpointId, BTreeSet<GUID>>,
+    /// Ours that are joined to each other; such joints are never counted.
+    echoes: BTreeSet<(EndpointId, GUID)>,
     changed: BTreeSet<EndpointId>,
 }
 
@@ -20,6 +22,7 @@ impl Matching {
             participant,
             ours: BTreeMap::new(),
             remote: BTreeMap::new(),
+            echoes: BTreeSet::new(),
             changed: BTreeSet::new(),
         }
     }
@@ -35,7 +38,18 @@ impl Matching {
         if let Some(endpoint) = self.ours.remove(&guid) {
             self.remote.remove(&endpoint);
             self.changed.remove(&endpoint);
+            self.echoes.retain(|(ours, _)| *ours != endpoint);
         }
+    }
+
+    /// Whom to write to one by one, because a reader of our own is joined to this writer too.
+    ///
+    /// That is so while a component moves: both robots have the reader and the writer. RustDDS
+    /// finds no route to itself and would send every fragment to the multicast group, on every
+    /// interface, to every robot.
+    pub(super) fn one_by_one(&self, endpoint: EndpointId) -> Option<&BTreeSet<GUID>> {
+        let echoes = self.echoes.iter().any(|(ours, _)| *ours == endpoint);
+        echoes.then(|| self.remote.get(&endpoint))?
     }
 
     /// Takes in one event; built-in endpoints are nobody's and fall through.
@@ -69,13 +83,15 @@ impl Matching {
 
     fn join(&mut self, ours: GUID, remote: GUID) {
         let Some(endpoint) = self.ours.get(&ours) else { return };
-        let own = remote.prefix == self.participant.prefix;
-        if !own && self.remote.entry(*endpoint).or_default().insert(remote) {
+        if remote.prefix == self.participant.prefix {
+            self.echoes.insert((*endpoint, remote));
+        } else if self.remote.entry(*endpoint).or_default().insert(remote) {
             self.changed.insert(*endpoint);
         }
     }
 
     fn part(&mut self, gone: impl Fn(&GUID) -> bool) {
+        self.echoes.retain(|(_, theirs)| !gone(theirs));
         for (endpoint, remote) in &mut self.remote {
             let before = remote.len();
             remote.retain(|guid| !gone(guid));
@@ -117,6 +133,23 @@ mod tests {
 
         assert_eq!(matching.poll(), Some(Matched { endpoint: 5, count: 1 }));
         assert_eq!(matching.poll(), None);
+    }
+
+    #[test]
+    fn a_writer_joined_to_our_own_reader_has_its_readers_named() {
+        let mut matching = Matching::new(guid(1, 0));
+        matching.add(guid(1, 9), 5);
+        matching.handle(&matched(guid(1, 9), guid(2, 1)));
+        assert_eq!(matching.one_by_one(5), None);
+
+        matching.handle(&matched(guid(1, 9), guid(1, 8)));
+        assert_eq!(matching.one_by_one(5), Some(&BTreeSet::from([guid(2, 1)])));
+
+        matching.handle(&DomainParticipantStatusEvent::ReaderLost {
+            guid: guid(1, 8),
+            reason: LostReason::Disposed,
+        });
+        assert_eq!(matching.one_by_one(5), None);
     }
 
     #[test]

@@ -21,7 +21,7 @@ struct End {
 impl End {
     fn join(domain_id: u16) -> Self {
         let bell = Arc::new(Bell::new().unwrap());
-        Self { dds: Dds::join(domain_id, &bell).unwrap(), bell }
+        Self { dds: Dds::join(domain_id, &[], &bell).unwrap(), bell }
     }
 
     fn wait(&mut self) {
@@ -128,4 +128,26 @@ fn a_renewed_writer_finds_its_reader_again() {
 
     assert_eq!(right.receive(reader, &mut body), Arrival::Sample(origin(9)));
     assert_eq!(body, b"anew");
+}
+
+#[test]
+fn a_writer_with_a_reader_of_our_own_sends_to_the_others_alone() {
+    let (mut left, writer, mut right, reader) = joined(Reliability::Reliable);
+    let Some(Endpoint::Writer(open)) = left.dds.endpoints.get(&writer) else { unreachable!() };
+    let topic = open.topic.clone();
+    let echo = left.dds.open(Way::In, &topic).unwrap();
+    let since = Instant::now();
+    while left.dds.matching.one_by_one(writer).is_none() {
+        assert!(since.elapsed() < PATIENCE, "waited for our own two to be joined");
+        while left.dds.poll_matched().is_some() {}
+        left.wait();
+    }
+
+    let mut body = Vec::new();
+    for sequence in 1..=20 {
+        left.dds.send(writer, &origin(sequence), &[7; 10_000]).unwrap();
+        assert_eq!(right.receive(reader, &mut body), Arrival::Sample(origin(sequence)));
+    }
+
+    assert_eq!(left.dds.receive(echo, &mut body), None);
 }

@@ -82,6 +82,7 @@ path = [{programs}]
 on_agent_death = "stop"
 [ros]
 domain_id = {domain}
+addresses = ["127.0.0.1"]
 [coordinator]
 preference = "{preference}"
 [api]
@@ -106,7 +107,7 @@ recordings = {{ ports = ["exploration.position.odometry"] }}
 }
 
 /// A path as a TOML string.
-fn quoted(path: &Path) -> String {
+pub(crate) fn quoted(path: &Path) -> String {
     let mut text = String::from("\"");
     for character in path.to_string_lossy().chars() {
         match character {

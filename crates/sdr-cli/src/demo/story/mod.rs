@@ -16,7 +16,9 @@ use sdr_core::{
 use sdr_lab::world::monotonic_ns;
 use serde::Deserialize;
 
-use self::state::{has_moved, is_up, progress};
+pub(crate) use self::state::is_up;
+
+use self::state::{has_moved, progress};
 use super::{
     Plan,
     board::{Board, Step},
@@ -50,7 +52,7 @@ const MOVED: [&str; 2] = ["fisheye", "anomaly"];
 
 /// Plays it.
 pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Failure> {
-    let folder = Folder::new()?;
+    let folder = Folder::new("sdr-")?;
     for program in system::executables(folder.path())? {
         locate::component(&program)?;
     }
@@ -267,6 +269,7 @@ impl Story<'_> {
             truth: self.stage.truth(),
             commands_ns: self.stage.commands_ns(),
             detector: self.plan.images.is_none().then(|| self.stage.detector(until_ns)),
+            lab: None,
         }
     }
 

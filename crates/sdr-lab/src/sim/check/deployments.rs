@@ -48,20 +48,7 @@ impl Deployments {
         found
     }
 
-    /// An undeployment that was stored before its robot could answer for it counts, too.
-    fn take_undeployed(&mut self, fleet: &Fleet) {
-        for (system, accepted) in &mut self.accepted {
-            let robots = 0..fleet.robots.len();
-            let known = robots.filter_map(|robot| system_of(fleet, robot, system));
-            let greatest = known.filter(|(version, _)| *version > accepted.version).max();
-            if let Some((version, false)) = greatest {
-                *accepted = Accepted { version, wanted: false, holders: BTreeSet::new() };
-            }
-        }
-    }
-
     fn look(&mut self, fleet: &Fleet) -> Option<Broken> {
-        self.take_undeployed(fleet);
         let mut found = None;
         for (system, (revision, holders)) in &mut self.accepted {
             for robot in (0..fleet.robots.len()).filter(|robot| fleet.robots[*robot].is_on()) {
