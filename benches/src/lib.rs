@@ -5,6 +5,13 @@ use std::{
     path::PathBuf,
 };
 
+/// CLOCK_MONOTONIC, as agents and components tell it.
+pub fn monotonic_ns() -> u64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+    let (seconds, nanos) = (u64::try_from(now.tv_sec), u64::try_from(now.tv_nsec));
+    seconds.unwrap_or(0) * 1_000_000_000 + nanos.unwrap_or(0)
+}
+
 /// The programs of the profile this bench was built in.
 pub fn programs() -> io::Result<PathBuf> {
     let own = std::env::current_exe()?;

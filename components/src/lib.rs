@@ -1,4 +1,5 @@
-//! What the paper's five components think, as plain functions on plain types.
+//! What the paper's five components think, as plain functions on plain types; and [`faulty`], which
+//! misbehaves on order.
 //!
 //! ```text
 //! fisheye -> anomaly (vision: red box) ---- danger ----+
@@ -12,5 +13,6 @@
 
 pub mod control;
 pub mod estimate;
+pub mod faulty;
 pub mod programs;
 pub mod vision;

@@ -3,5 +3,6 @@
 
 mod brain;
 mod e2e;
+mod golden;
 mod sim;
 mod tidy;

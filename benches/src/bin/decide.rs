@@ -50,6 +50,9 @@ impl Probe for Watch {
             | Input::Route { .. }
             | Input::Deploy { .. }
             | Input::Undeploy { .. }
+            | Input::Reset { .. }
+            | Input::Told { .. }
+            | Input::Hold { .. }
             | Input::MoveRole { .. }
             | Input::RolePolicy { .. }
             | Input::Planned { .. }

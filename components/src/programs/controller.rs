@@ -42,7 +42,7 @@ impl Component for MotionController {
             danger: setup.input("danger")?,
             odometry: setup.input("odometry")?,
             measured: setup.output("wheels")?,
-            command: setup.output("command")?,
+            command: setup.output("command")?.with_safe(&Twist::default())?,
             wheels: Wheels::new(setup.device("wheels")?),
             settings,
             path,

@@ -9,9 +9,9 @@ use rand::rngs::OsRng;
 use sdr_component::protocol::SharedMemory;
 use sdr_core::{brain::BrainConfig, order::hash64, report::RobotFacts, units::Bytes};
 use sdr_files::RobotConfig;
-use sdr_files::robot::{BatterySource, PositionSource, RssiSource};
+use sdr_files::robot::{BatterySource, DeviceConfig, PositionSource, RssiSource};
 
-use crate::installed;
+use crate::installed::{self, Device};
 use crate::metrics::{MetricsConfig, Radio, Sensors, Source, host};
 use crate::supervisor::{LogFiles, Patience, SupervisorConfig};
 
@@ -43,13 +43,20 @@ pub(crate) fn memory_capacity(config: &RobotConfig) -> Bytes {
     config.capacity.memory.unwrap_or_else(of_machine)
 }
 
+/// Parts of the body; those with a file are watched.
+pub(crate) fn devices(config: &RobotConfig) -> Vec<Device> {
+    let device =
+        |device: &DeviceConfig| Device { name: device.name.clone(), file: device.path.clone() };
+    config.devices.iter().map(device).collect()
+}
+
 /// The brain's, but for where the mesh listens; `fleet` is the one that keys name.
 pub(crate) fn brain(config: &RobotConfig, fleet: Option<&str>) -> BrainConfig {
     let facts = RobotFacts {
         memory_capacity: memory_capacity(config),
         cpu_capacity: config.capacity.cpu.unwrap_or_else(host::cpu),
         labels: config.labels.clone(),
-        devices: config.devices.iter().map(|device| device.name.clone()).collect(),
+        devices: installed::present(&devices(config)),
         launchables: installed::launchables(&component_path(config)),
         role: config.coordinator,
         api: config.api.socket.display().to_string(),
@@ -121,6 +128,7 @@ pub(crate) fn supervisor(config: &RobotConfig) -> SupervisorConfig {
         on_agent_death: config.components.on_agent_death,
         devices,
         memory: shared_memory(config),
+        cgroup: config.components.cgroup.clone(),
         patience: Patience::default(),
     }
 }

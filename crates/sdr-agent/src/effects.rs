@@ -8,6 +8,7 @@ use crate::data::Data;
 use crate::events::Events;
 use crate::mesh::udp::Mesh;
 use crate::plan;
+use crate::programs::Programs;
 use crate::store::Store;
 use crate::supervisor::Supervisor;
 
@@ -21,6 +22,7 @@ pub(crate) struct Effects {
     pub(crate) desk: AnswerDesk,
     pub(crate) events: Events,
     pub(crate) plan: LatestPlan,
+    pub(crate) programs: Programs,
     /// For what comes of a plan.
     pub(crate) inputs: mpsc::Sender<Input>,
 }
@@ -37,6 +39,7 @@ impl Effects {
             Effect::Plan { plan, problem } => {
                 plan::carry_out(plan, problem, self.plan.clone(), self.inputs.clone());
             }
+            Effect::Ask(order) => self.programs.ask(*order),
             Effect::Answer { request, result } => self.desk.answer(request, result),
             Effect::Event(event) => self.events.publish(event),
         }

@@ -1,18 +1,21 @@
-//! What this robot can launch, looked at again while it runs.
+//! What this robot can launch, and which of its devices are there, looked at again while it
+//! runs.
 
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-use sdr_core::{input::Input, report::RobotFacts, spec::launch_hash};
+use sdr_core::{id::Name, input::Input, report::RobotFacts, spec::launch_hash};
 use tokio::sync::{Mutex, mpsc};
 
 use crate::supervisor::executables;
 
-/// Time between two looks at the folders.
-const LOOK_PERIOD: Duration = Duration::from_secs(5);
-/// Every so many looks all files are read, changed folders or not: a file that becomes
+/// Time between two looks at devices.
+const DEVICES_PERIOD: Duration = Duration::from_millis(500);
+/// Every so many of them the folders are looked at.
+const FOLDERS_EVERY: u32 = 10;
+/// Every so many looks at folders all files are read, changed folders or not: a file that becomes
 /// executable leaves no trace in its folder.
 const THOROUGH_EVERY: u32 = 12;
 /// A folder may change again within the same tick of its clock, and a file is often made
@@ -22,9 +25,11 @@ const SETTLED_AFTER: Duration = Duration::from_secs(10);
 /// How far a look goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Look {
-    /// Only at folders that changed.
+    /// Only at devices.
+    Devices,
+    /// Also at folders that changed.
     Changed,
-    /// At all files.
+    /// Also at all files.
     Thorough,
 }
 
@@ -32,8 +37,23 @@ pub(crate) enum Look {
 #[derive(Clone, Debug)]
 pub(crate) struct Installed {
     folders: Arc<[PathBuf]>,
+    devices: Arc<[Device]>,
     inputs: mpsc::Sender<Input>,
     told: Arc<Mutex<Told>>,
+}
+
+/// A part of the body, and the file that is there when it is.
+#[derive(Clone, Debug)]
+pub(crate) struct Device {
+    pub(crate) name: Name,
+    /// `None`: nobody can tell, so it is there.
+    pub(crate) file: Option<PathBuf>,
+}
+
+/// The names of those that are there.
+pub(crate) fn present(devices: &[Device]) -> Vec<Name> {
+    let is_there = |device: &&Device| device.file.as_ref().is_none_or(|file| file.exists());
+    devices.iter().filter(is_there).map(|device| device.name.clone()).collect()
 }
 
 /// What the brain was told last, and what the folders looked like then.
@@ -53,13 +73,18 @@ pub(crate) fn launchables(folders: &[PathBuf]) -> Vec<u32> {
 impl Installed {
     /// For a brain that knows `facts`; changes go to `inputs`.
     pub(crate) fn new(
-        folders: Vec<PathBuf>,
+        (folders, devices): (Vec<PathBuf>, Vec<Device>),
         facts: RobotFacts,
         inputs: mpsc::Sender<Input>,
     ) -> Self {
         // No folder was seen at any time yet, so the first look reads all.
         let told = Told { facts, modified: Vec::new() };
-        Self { folders: folders.into(), inputs, told: Arc::new(Mutex::new(told)) }
+        Self {
+            folders: folders.into(),
+            devices: devices.into(),
+            inputs,
+            told: Arc::new(Mutex::new(told)),
+        }
     }
 
     /// Looks again and again until the loop ends. Call within a `LocalSet`.
@@ -67,10 +92,14 @@ impl Installed {
         tokio::task::spawn_local(async move {
             let mut looks = 0_u32;
             loop {
-                tokio::time::sleep(LOOK_PERIOD).await;
+                tokio::time::sleep(DEVICES_PERIOD).await;
                 looks = looks.wrapping_add(1);
-                let thorough = looks.is_multiple_of(THOROUGH_EVERY);
-                let look = if thorough { Look::Thorough } else { Look::Changed };
+                let look = match looks {
+                    _ if looks.is_multiple_of(FOLDERS_EVERY * THOROUGH_EVERY) => Look::Thorough,
+                    _ if looks.is_multiple_of(FOLDERS_EVERY) => Look::Changed,
+                    _ if self.devices.iter().any(|device| device.file.is_some()) => Look::Devices,
+                    _ => continue,
+                };
                 if self.refresh(look).await.is_err() {
                     return;
                 }
@@ -83,20 +112,27 @@ impl Installed {
     pub(crate) async fn refresh(&self, look: Look) -> Result<(), LoopEnded> {
         // Held to the end: who comes second must not overtake what the first one found.
         let mut told = self.told.lock().await;
-        let folders = Arc::clone(&self.folders);
-        let before = std::mem::take(&mut told.modified);
+        let (folders, devices) = (Arc::clone(&self.folders), Arc::clone(&self.devices));
+        let before = told.modified.clone();
         let looked = tokio::task::spawn_blocking(move || {
+            let present = present(&devices);
+            if look == Look::Devices {
+                return (before, None, present);
+            }
             let modified: Vec<_> = folders.iter().map(modified_at).collect();
             let same = look == Look::Changed && modified == before;
             let found = (!same || modified.iter().any(is_fresh)).then(|| launchables(&folders));
-            (modified, found)
+            (modified, found, present)
         });
         // It only fails when the runtime goes down.
-        let (modified, found) = looked.await.map_err(|_| LoopEnded)?;
+        let (modified, found, devices) = looked.await.map_err(|_| LoopEnded)?;
+        let mut facts = RobotFacts { devices, ..told.facts.clone() };
         if let Some(found) = found.filter(|found| *found != told.facts.launchables) {
             let (before, now) = (told.facts.launchables.len(), found.len());
             tracing::info!(event = "executables-changed", before, now);
-            let facts = RobotFacts { launchables: found, ..told.facts.clone() };
+            facts.launchables = found;
+        }
+        if facts != told.facts {
             let input = Input::Facts(Box::new(facts.clone()));
             self.inputs.send(input).await.map_err(|_| LoopEnded)?;
             told.facts = facts;
@@ -165,7 +201,7 @@ pub(crate) mod tests {
     async fn what_is_installed_or_removed_later_is_told_once() {
         let dir = tempfile::tempdir().unwrap();
         let (sender, mut inputs) = mpsc::channel(4);
-        let installed = Installed::new(vec![dir.path().into()], facts(), sender);
+        let installed = Installed::new((vec![dir.path().into()], vec![]), facts(), sender);
         installed.refresh(Look::Changed).await.unwrap();
         assert_eq!(told(&mut inputs), None);
 
@@ -186,7 +222,7 @@ pub(crate) mod tests {
         install(dir.path(), "camera", 0o644);
         age(dir.path());
         let (sender, mut inputs) = mpsc::channel(4);
-        let installed = Installed::new(vec![dir.path().into()], facts(), sender);
+        let installed = Installed::new((vec![dir.path().into()], vec![]), facts(), sender);
         installed.refresh(Look::Changed).await.unwrap();
 
         let executable = fs::Permissions::from_mode(0o755);
@@ -198,13 +234,41 @@ pub(crate) mod tests {
     }
 
     #[tokio::test]
+    async fn a_device_that_goes_and_comes_is_told_each_time() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("video0");
+        let name = |word| Name::new(word).unwrap();
+        let camera = Device { name: name("camera"), file: Some(file.clone()) };
+        let wheels = Device { name: name("wheels"), file: None };
+        let (sender, mut inputs) = mpsc::channel(4);
+        let facts = RobotFacts { devices: present(&[wheels.clone()]), ..facts() };
+        let installed = Installed::new((vec![], vec![camera, wheels]), facts, sender);
+        let mut told = || {
+            let input = inputs.try_recv().ok()?;
+            let Input::Facts(facts) = input else { panic!("{input:?}") };
+            Some(facts.devices)
+        };
+
+        installed.refresh(Look::Devices).await.unwrap();
+        assert_eq!(told(), None);
+
+        fs::write(&file, "").unwrap();
+        installed.refresh(Look::Devices).await.unwrap();
+        assert_eq!(told(), Some(vec![name("camera"), name("wheels")]));
+
+        fs::remove_file(&file).unwrap();
+        installed.refresh(Look::Devices).await.unwrap();
+        assert_eq!(told(), Some(vec![name("wheels")]));
+    }
+
+    #[tokio::test]
     async fn nothing_is_told_when_the_loop_has_ended() {
         let dir = tempfile::tempdir().unwrap();
         install(dir.path(), "camera", 0o755);
         let (sender, inputs) = mpsc::channel(4);
         drop(inputs);
 
-        let installed = Installed::new(vec![dir.path().into()], facts(), sender);
+        let installed = Installed::new((vec![dir.path().into()], vec![]), facts(), sender);
 
         assert!(installed.refresh(Look::Changed).await.is_err());
     }

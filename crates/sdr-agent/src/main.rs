@@ -17,16 +17,19 @@ mod data;
 mod effects;
 mod events;
 mod installed;
+mod limits;
 mod memory;
 mod mesh;
 mod metrics;
 mod plan;
+mod programs;
 mod record;
 mod run;
 mod store;
 mod supervisor;
 mod taps;
 mod trouble;
+mod upgrade;
 mod world;
 
 use std::error::Error;
@@ -45,6 +48,8 @@ use tokio::task::LocalSet;
 use tracing_subscriber::filter::ParseError;
 use tracing_subscriber::{Layer, filter::Targets, layer::SubscriberExt, util::SubscriberInitExt};
 
+use run::Ending;
+use supervisor::Whom;
 use world::World;
 
 /// Shared memory and sockets of many components need more than the usual 1024 descriptors.
@@ -68,6 +73,9 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
+    if std::env::args_os().nth(1).is_some_and(|word| word == limits::EXEC) {
+        return limits::exec();
+    }
     let arguments = Arguments::parse();
     let file = arguments.config.unwrap_or_else(|| Places::of_this_process().robot_file());
     let robot = match sdr_files::load_robot(&file) {
@@ -86,26 +94,29 @@ fn main() -> ExitCode {
     if arguments.end_with_stdin {
         thread::spawn(end_with_stdin);
     }
-    match serve(&robot) {
-        Ok(()) => ExitCode::SUCCESS,
+    let successor = upgrade::Successor::of_this_process();
+    match serve(&robot, &successor) {
+        Ok(Ending::Upgrade) => fail(&successor.replace_this_process(), 1),
+        Ok(Ending::NotYet | Ending::Leave | Ending::All) => ExitCode::SUCCESS,
         Err(error) => fail(&chain(&*error), 1),
     }
 }
 
-fn serve(robot: &RobotConfig) -> Result<(), Box<dyn Error>> {
+fn serve(robot: &RobotConfig, successor: &upgrade::Successor) -> Result<Ending, Box<dyn Error>> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     LocalSet::new().block_on(&runtime, async {
-        let stop = stop_signals()?;
-        let (brain, mut world) = World::start(robot).await?;
-        run::run(brain, &mut world, stop).await;
-        world.stop().await;
-        Ok(())
+        let (teller, ending) = watch::channel(Ending::NotYet);
+        end_with_signals(teller.clone())?;
+        upgrade::listen(successor.clone(), teller.clone())?;
+        let (brain, mut world) = World::start(robot, teller).await?;
+        let ending = run::run(brain, &mut world, ending).await;
+        world.stop(if ending == Ending::All { Whom::All } else { Whom::NotKept }).await;
+        Ok(ending)
     })
 }
 
-/// Turns true with SIGTERM or SIGINT; the second one ends the process at once.
-fn stop_signals() -> io::Result<watch::Receiver<bool>> {
-    let (stop, stopped) = watch::channel(false);
+/// SIGTERM and SIGINT end the agent; the second one ends the process at once.
+fn end_with_signals(teller: watch::Sender<Ending>) -> io::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     tokio::task::spawn_local(async move {
@@ -118,10 +129,10 @@ fn stop_signals() -> io::Result<watch::Receiver<bool>> {
                 std::process::exit(1);
             }
             // The loop may have ended by itself.
-            let _ = stop.send(true);
+            let _ = teller.send(Ending::Leave);
         }
     });
-    Ok(stopped)
+    Ok(())
 }
 
 /// Waits until nobody can write to standard input any more, then ends the agent as SIGTERM does.

@@ -13,9 +13,8 @@ use sdr_core::{
     input::Input,
 };
 use sdr_files::RobotConfig;
-use sdr_files::robot::OnAgentDeath;
 use thiserror::Error;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 
 use crate::api::{self, AnswerDesk, Api, ApiError, ApiState, LatestPlan, Profiles, Question};
 use crate::blobs::{BlobStore, StoreError, Streams, StreamsError};
@@ -30,9 +29,11 @@ use crate::mesh::{
     watch::MeshWatch,
 };
 use crate::metrics::{Metrics, SensorPorts, Watch};
+use crate::programs::Programs;
 use crate::record::{self, RecordSender, Recorder, RecorderNews};
+use crate::run::Ending;
 use crate::store::{self, Remembered, Store};
-use crate::supervisor::{self, Outlets, Supervisor};
+use crate::supervisor::{self, Left, Outlets, Supervisor, Survivor, Whom};
 use crate::taps::{self, Listeners, PortTypes};
 use crate::trouble::Trouble;
 use crate::{clock, config, memory};
@@ -92,6 +93,8 @@ pub(crate) enum StartError {
 pub(crate) struct World {
     /// Metrics, mesh, and what came of effects.
     pub(crate) inputs: mpsc::Receiver<Input>,
+    /// What the brain must be told before anything else.
+    pub(crate) adopted: Vec<Input>,
     /// From the API.
     pub(crate) questions: mpsc::Receiver<Question>,
     /// Who takes orders.
@@ -102,7 +105,6 @@ pub(crate) struct World {
     metrics: Metrics,
     recorder: Option<Recorder>,
     memory: SharedMemory,
-    on_agent_death: OnAgentDeath,
     /// Robots that the data plane knows.
     robots: Vec<RobotId>,
     /// Held as long as this agent lives.
@@ -116,6 +118,7 @@ struct Ground {
     recorder: Option<Recorder>,
     record: RecordSender,
     stored: Option<StoredState>,
+    survivors: Vec<Survivor>,
 }
 
 /// What other crates fill in for the brain.
@@ -128,8 +131,11 @@ fn seams() -> Seams {
 }
 
 impl World {
-    /// Makes everything. Call within a `LocalSet`.
-    pub(crate) async fn start(robot: &RobotConfig) -> Result<(Box<Brain>, Self), StartError> {
+    /// Makes everything. Call within a `LocalSet`; who ends the agent by the API tells `ending`.
+    pub(crate) async fn start(
+        robot: &RobotConfig,
+        ending: watch::Sender<Ending>,
+    ) -> Result<(Box<Brain>, Self), StartError> {
         let state = &robot.storage.state;
         fs::create_dir_all(state).map_err(at("make", state))?;
         let lock = lock(state)?;
@@ -147,7 +153,8 @@ impl World {
         let mut brain_config = config::brain(robot, fleet);
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
         let facts = brain_config.facts.clone();
-        let installed = Installed::new(config::component_path(robot), facts, sender.clone());
+        let looked_at = (config::component_path(robot), config::devices(robot));
+        let installed = Installed::new(looked_at, facts, sender.clone());
         let brain = Brain::new(brain_config, seams(), ground.stored, clock::now());
 
         let outlets = Outlets {
@@ -159,8 +166,9 @@ impl World {
         };
         let supervisor_config = config::supervisor(robot);
         let logs = supervisor_config.logs.clone();
-        let supervisor = Supervisor::start(supervisor_config, outlets.clone())
-            .map_err(because("components' socket"))?;
+        let (supervisor, adopted) =
+            Supervisor::start(supervisor_config, outlets.clone(), ground.survivors)
+                .map_err(because("components' socket"))?;
         let store = Store::start(state.clone(), sender.clone(), ground.events.clone())
             .map_err(because("store"))?;
         let (metrics, data) = start_senses(robot, outlets)?;
@@ -181,13 +189,18 @@ impl World {
             profiles: Profiles::new(config::component_path(robot)),
             keys: keys.clone(),
             streams,
+            ending,
         };
         let api = Api::start(robot.api.socket.clone(), listener, remote, api_state);
         installed.watch();
         let events = ground.events;
-        let effects = Effects { mesh, store, supervisor, data, desk, events, plan, inputs: sender };
+        let programs = config::component_path(robot);
+        let programs = Programs::new(robot.name.clone(), programs, sender.clone());
+        let effects =
+            Effects { mesh, store, supervisor, data, desk, events, plan, programs, inputs: sender };
         let world = Self {
             inputs,
+            adopted,
             questions,
             effects,
             mesh_watch: MeshWatch::new(trouble, keys),
@@ -195,7 +208,6 @@ impl World {
             metrics,
             recorder: ground.recorder,
             memory: config::shared_memory(robot),
-            on_agent_death: robot.components.on_agent_death,
             robots: Vec::new(),
             _lock: ground.lock,
         };
@@ -213,21 +225,21 @@ impl World {
         }
     }
 
-    /// Ends everything, the last first; components go on when they are to be kept.
-    pub(crate) async fn stop(mut self) {
+    /// Ends everything, the last first; of the components those that `whom` says.
+    pub(crate) async fn stop(mut self, whom: Whom) {
         self.api.stop();
         // Nobody reads them any more; whoever sends is told so instead of waiting.
         self.inputs.close();
-        self.effects.supervisor.stop().await;
+        let left = self.effects.supervisor.stop(whom).await;
         drop(self.metrics);
         let Effects { data, store, events, .. } = self.effects;
         data.stop();
         drop(store);
         events.publish(events.new_event("agent-stopped", "told to stop"));
         drop(self.recorder);
-        match self.on_agent_death {
-            OnAgentDeath::Keep => {}
-            OnAgentDeath::Stop => memory::clean(&self.memory),
+        match left {
+            Left::Some => {}
+            Left::Nothing => memory::clean(&self.memory),
         }
     }
 }
@@ -255,12 +267,16 @@ async fn start_mesh(
     Ok((mesh, Some(streams)))
 }
 
-/// Reads what was remembered and clears what a predecessor left.
+/// Reads what was remembered, finds what a predecessor left running, and clears the rest.
 fn prepare(robot: &RobotConfig, lock: File) -> Result<Ground, StartError> {
     let state = &robot.storage.state;
     let events = Events::new(robot.name.clone());
-    supervisor::end_leftovers(state, &events);
-    memory::clean(&config::shared_memory(robot));
+    let survivors = supervisor::find_survivors(&config::supervisor(robot), &events);
+    if survivors.is_empty() {
+        // Nobody uses it: what is there was left by the dead. With survivors, opening it gives
+        // back what only the dead used.
+        memory::clean(&config::shared_memory(robot));
+    }
     let recorder = start_recorder(robot, &events)?;
     let record = match &recorder {
         Some(recorder) => recorder.sender(),
@@ -281,7 +297,7 @@ fn prepare(robot: &RobotConfig, lock: File) -> Result<Ground, StartError> {
     let started = format!("sdr-agent {} on {}", env!("CARGO_PKG_VERSION"), robot.name);
     let pid = f64::from(std::process::id());
     events.publish(events.new_event("agent-started", started).number("pid", pid));
-    Ok(Ground { lock, events, recorder, record, stored })
+    Ok(Ground { lock, events, recorder, record, stored, survivors })
 }
 
 fn start_recorder(robot: &RobotConfig, events: &Events) -> Result<Option<Recorder>, StartError> {

@@ -14,6 +14,7 @@ mod client;
 mod command;
 mod demo;
 mod failure;
+mod lab;
 mod locate;
 mod output;
 mod render;
@@ -24,7 +25,10 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::{Parser, Subcommand};
 
 use crate::{
-    command::{completions, deploy, events, keys, logs, role, sim, status, undeploy, validate},
+    command::{
+        completions, deploy, events, keys, logs, policy, reset, role, sim, status, stop, undeploy,
+        validate,
+    },
     failure::Failure,
     output::{Format, Output},
 };
@@ -72,6 +76,12 @@ enum Command {
     Events(events::EventsArgs),
     /// Show what a component wrote
     Logs(logs::LogsArgs),
+    /// Try a component anew that is held, or stopped by an emergency stop
+    Reset(reset::ResetArgs),
+    /// Say in words what a recovery policy does
+    Policy(policy::PolicyArgs),
+    /// End a robot's components, and then its agent
+    Stop(stop::StopArgs),
     /// Show, explain and change who coordinates
     Role(role::RoleArgs),
     /// Make, give out and take back the fleet's keys
@@ -80,6 +90,14 @@ enum Command {
     Report(report::ReportArgs),
     /// Run three robots, five components and one move on this machine
     Demo(demo::DemoArgs),
+    /// Run a scenario: real agents on a played radio, and what must come of it
+    Lab(lab::LabArgs),
+    /// A robot of the lab, seen from inside; `sdr lab` starts it
+    #[command(name = sdr_lab::bed::ROLE, hide = true)]
+    LabRole {
+        /// Which
+        role: String,
+    },
     /// Run the agents' brains in virtual time, under faults
     Sim(sim::SimArgs),
     /// Print a completion script for a shell
@@ -88,6 +106,10 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    if let Command::LabRole { role } = &cli.command {
+        // Before there is any thread: namespaces are entered by a process that has only one.
+        return sdr_lab::bed::play(role);
+    }
     let session = Session { agent: cli.agent, keys: cli.keys, output: Output::new(cli.output) };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let ended = match runtime {
@@ -105,10 +127,15 @@ async fn run(command: Command, session: &Session) -> Result<ExitCode, Failure> {
         Command::Status(args) => status::run(args, session).await,
         Command::Events(args) => events::run(args, session).await,
         Command::Logs(args) => logs::run(args, session).await,
+        Command::Reset(args) => reset::run(args, session).await,
+        Command::Policy(args) => policy::run(args, session),
+        Command::Stop(args) => stop::run(args, session).await,
         Command::Role(args) => role::run(args, session).await,
         Command::Keys(args) => keys::run(args, session).await,
         Command::Report(args) => report::run(args, session).await,
         Command::Demo(args) => demo::run(args, session).await,
+        Command::Lab(args) => lab::run(args, session).await,
+        Command::LabRole { role } => Ok(sdr_lab::bed::play(&role)),
         Command::Sim(args) => sim::run(args, session),
         Command::Completions(args) => completions::run::<Cli>(args, session),
     }

@@ -8,7 +8,7 @@ use crate::{
     allocate::{Homeless, Placement},
     event::Event,
     fitness::RolePolicy,
-    id::RobotId,
+    id::{Name, RobotId},
     lifecycle::LifecycleState,
     spec::SystemSpec,
 };
@@ -178,11 +178,31 @@ pub struct RoleAnswer {
     pub changed: bool,
 }
 
+/// `POST /v1/reset`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ResetRequest {
+    /// Of which system.
+    pub system: Name,
+    /// Which component.
+    pub component: Name,
+}
+
+/// Answer to a reset that was accepted and stored.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ResetAnswer {
+    /// The component, with its system.
+    pub component: String,
+    /// What latched it; null when nothing did.
+    pub was: Option<String>,
+}
+
 /// What came of a request that was accepted.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Accepted {
     /// A system was deployed or undeployed.
     System(DeployAnswer),
+    /// A component was reset.
+    Reset(ResetAnswer),
     /// The role or its policy was changed.
     Role(RoleAnswer),
 }
@@ -264,6 +284,13 @@ pub struct PlanView {
     pub placements: Vec<Placement>,
     /// Who has no home.
     pub homeless: Vec<Homeless>,
+}
+
+/// Answer of `POST /v1/stop`: components end, then the agent.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StopAnswer {
+    /// Whose.
+    pub robot: String,
 }
 
 /// Any refusal of the API: HTTP status 4xx or 5xx.

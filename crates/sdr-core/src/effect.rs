@@ -10,10 +10,11 @@ use crate::{
     api::Accepted,
     event::Event,
     id::{ComponentKey, Name, RobotId},
-    input::{InstanceId, PlanId, RequestId, StoreTicket},
+    input::{InstanceId, PlanId, QuestionId, RequestId, StoreTicket},
     mesh::{Fact, Facts},
     order::{Run, Token},
     record::FleetKey,
+    recover::{Evidence, HangLimit, Program},
     spec::{ComponentSpec, Qos},
 };
 
@@ -53,6 +54,8 @@ pub enum Effect {
         /// The question.
         problem: Box<Problem>,
     },
+    /// Ask a program of the operator's about components, off the loop; answered by `Told`.
+    Ask(Box<ProgramOrder>),
     /// Answer an API client.
     Answer {
         /// Whom.
@@ -62,6 +65,19 @@ pub enum Effect {
     },
     /// Tell operators and the recording.
     Event(Event),
+}
+
+/// A question to a program of the operator's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProgramOrder {
+    /// Names the question.
+    pub question: QuestionId,
+    /// What to run.
+    pub program: Program,
+    /// The system it is asked about.
+    pub system: Name,
+    /// What is seen of its components here.
+    pub evidence: Vec<Evidence>,
 }
 
 /// How to start an instance.
@@ -107,6 +123,8 @@ pub enum Command {
     Kill,
     /// Leave the error state.
     Reset,
+    /// Take it for hung after this silence; `None`: after the agent's own.
+    Patience(Option<HangLimit>),
 }
 
 /// A port that crosses robots, from this robot's side.

@@ -1,20 +1,21 @@
 //! Everything the brain can be told.
 
 use alloc::{boxed::Box, string::String, vec::Vec};
-use core::net::SocketAddr;
+use core::{net::SocketAddr, time::Duration};
 
 use crate::{
     allocate::{AllocError, Plan},
+    effect::InputWiring,
     fitness::RolePolicy,
-    id::{Name, RobotId},
+    id::{ComponentKey, Name, RobotId},
     lifecycle::LifecycleState,
     order::Token,
     recover::Cause,
     report::{HostReport, RobotFacts, Usage},
-    spec::SystemSpec,
+    spec::{ComponentSpec, SystemSpec},
 };
 
-/// Names one started process of a component on this robot; grows within one agent process.
+/// Names one started process of a component on this robot; grows, also past those adopted.
 pub type InstanceId = u64;
 /// Names one request of an API client.
 pub type RequestId = u64;
@@ -22,6 +23,19 @@ pub type RequestId = u64;
 pub type StoreTicket = u64;
 /// Names one [`crate::effect::Effect::Plan`]; grows.
 pub type PlanId = u64;
+/// Names one [`crate::effect::Effect::Ask`]; grows.
+pub type QuestionId = u64;
+
+/// One cause that a program of the operator's found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    /// The component, by its name in the system.
+    pub component: Name,
+    /// What is wrong with it; `None`: the only cause that the program may find.
+    pub cause: Option<Cause>,
+    /// Why, for people.
+    pub reason: String,
+}
 
 /// One thing that happened outside.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +83,13 @@ pub enum Input {
         /// Which one.
         system: Name,
     },
+    /// An operator wants a component to be tried anew, whatever held it.
+    Reset {
+        /// To be answered.
+        request: RequestId,
+        /// Which one.
+        component: ComponentKey,
+    },
     /// An operator wants a robot to hold the coordinator role.
     MoveRole {
         /// To be answered.
@@ -82,6 +103,18 @@ pub enum Input {
         request: RequestId,
         /// How; checked by the shell.
         policy: Box<RolePolicy>,
+    },
+    /// A program of the operator's answered, or did not.
+    Told {
+        /// Of which question.
+        question: QuestionId,
+        /// What it found; the error is for people.
+        result: Result<Vec<Finding>, String>,
+    },
+    /// The agent is about to be away for a planned moment: others are to know.
+    Hold {
+        /// How long at most.
+        time: Duration,
     },
     /// A plan is ready.
     Planned {
@@ -104,9 +137,25 @@ pub enum Input {
     },
 }
 
+/// A process that outlived the agent which started it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Adoption {
+    /// Process id; the shell made sure that it is the same process.
+    pub pid: u32,
+    /// The component it is an instance of.
+    pub component: ComponentKey,
+    /// What it was started with.
+    pub spec: ComponentSpec,
+    /// How it was wired.
+    pub inputs: Vec<InputWiring>,
+}
+
 /// What happened to an instance.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InstanceNews {
+    /// It outlived the agent before this one and goes on; told before anything else. Its
+    /// state follows when it greets.
+    Adopted(Box<Adoption>),
     /// Its process runs.
     Started {
         /// Process id.
@@ -133,8 +182,20 @@ pub enum InstanceNews {
         /// The token accepted.
         token: Token,
     },
+    /// One of its inputs counted samples that came later than its deadline.
+    Late {
+        /// The connection's index in its system.
+        connection: u16,
+        /// How many, since the instance began.
+        count: u64,
+    },
     /// Its process ended.
     Exited {
+        /// Status and last lines of output.
+        reason: String,
+    },
+    /// Its process ended because memory was short: its limit's, or the robot's.
+    OutOfMemory {
         /// Status and last lines of output.
         reason: String,
     },

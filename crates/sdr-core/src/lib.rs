@@ -41,6 +41,7 @@ pub mod report;
 pub mod spec;
 
 pub mod allocate;
+mod cause;
 pub mod event;
 pub mod fitness;
 pub mod recover;

@@ -6,7 +6,7 @@
 
 use alloc::{string::String, sync::Arc, vec::Vec};
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
     fitness::RolePolicy,
@@ -16,6 +16,9 @@ use crate::{
 
 /// Longest value of one record, in bytes, so that a datagram of 1200 carries it.
 pub const RECORD_BYTES_MAX: usize = 1000;
+
+/// Fields that an older version did not write are read from so many zeros.
+const PADDING_BYTES: usize = 64;
 
 /// What a record is about. The number stands on the wire; unknown ones are kept and passed on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -38,6 +41,8 @@ impl RecordKind {
     pub const ROLE: Self = Self(7);
     /// [`RolePolicy`], keyed by nothing.
     pub const ROLE_POLICY: Self = Self(10);
+    /// [`Latch`], keyed by the component.
+    pub const LATCH: Self = Self(14);
 }
 
 /// Names one shared fact.
@@ -118,6 +123,18 @@ pub struct RoleRecord {
     pub by_operator: bool,
 }
 
+/// Whether a component must not act until somebody resets it. It stands in the fleet's table,
+/// so that neither a restart of its agent nor another home starts what drives a body.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Latch {
+    /// Which component.
+    pub component: ComponentKey,
+    /// Whether it is latched; a reset says that it is not.
+    pub latched: bool,
+    /// Why, for people.
+    pub reason: String,
+}
+
 /// A checked value of the fleet table; parts of systems are shared by all who look at them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FleetValue {
@@ -137,15 +154,25 @@ pub enum FleetValue {
     Role(RoleRecord),
     /// How its holder is chosen.
     RolePolicy(RolePolicy),
+    /// An emergency stop, or its end.
+    Latch(Latch),
     /// A kind that this version does not know; kept and passed on.
     Unknown,
 }
 
 impl FleetValue {
-    /// Reads the bytes of a record of `kind`; bytes behind the known fields are skipped.
+    /// Reads the bytes of a record of `kind`: bytes behind the known fields are skipped, and
+    /// fields that an older version did not write are none, empty or zero.
     pub fn decode(kind: RecordKind, bytes: &[u8]) -> Result<Self, postcard::Error> {
-        fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, postcard::Error> {
-            postcard::take_from_bytes(bytes).map(|(value, _later_fields)| value)
+        fn take<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, postcard::Error> {
+            match postcard::take_from_bytes(bytes) {
+                Ok((value, _later_fields)) => Ok(value),
+                Err(postcard::Error::DeserializeUnexpectedEnd) => {
+                    let padded: &[u8] = &[bytes, &[0; PADDING_BYTES]].concat();
+                    postcard::take_from_bytes(padded).map(|(value, _)| value)
+                }
+                Err(error) => Err(error),
+            }
         }
         match kind {
             RecordKind::SYSTEM => take(bytes).map(Self::System),
@@ -156,6 +183,7 @@ impl FleetValue {
             RecordKind::ASSIGNMENT => take(bytes).map(Self::Assignment),
             RecordKind::ROLE => take(bytes).map(Self::Role),
             RecordKind::ROLE_POLICY => take(bytes).map(Self::RolePolicy),
+            RecordKind::LATCH => take(bytes).map(Self::Latch),
             _ => Ok(Self::Unknown),
         }
     }
@@ -170,8 +198,28 @@ impl FleetValue {
             Self::Assignment(value) => postcard::to_allocvec(value),
             Self::Role(value) => postcard::to_allocvec(value),
             Self::RolePolicy(value) => postcard::to_allocvec(value),
+            Self::Latch(value) => postcard::to_allocvec(value),
             Self::Unknown => Ok(Vec::new()),
         };
         bytes.expect("writing plain data to memory cannot fail")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_component_of_a_version_before_limits_has_none() {
+        let spec = Arc::new(crate::spec::tests::component("lidar", &[]));
+        let bytes = FleetValue::Component(spec.clone()).encode();
+        // `on_agent_death` and the seven fields of `limits`, all none: a byte each
+        let older = &bytes[..bytes.len() - 8];
+
+        let read = FleetValue::decode(RecordKind::COMPONENT, older).unwrap();
+
+        assert_eq!(read, FleetValue::Component(spec));
+        // Names are never empty, so one that was cut off within its name is none.
+        assert!(FleetValue::decode(RecordKind::COMPONENT, &bytes[..3]).is_err());
     }
 }

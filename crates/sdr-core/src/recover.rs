@@ -9,77 +9,13 @@ use core::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::cause::{CAUSE_BYTES_MAX, Cause, CauseName, CauseNameError};
 use crate::{
     fitness::Alone,
     id::ComponentKey,
     time::Instant,
     units::{Bytes, Dbm, Permille},
 };
-
-/// What is wrong: the rows of the paper's Table III, and our own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Cause {
-    /// Free memory of the robot is short.
-    MemoryShort,
-    /// The component takes too much CPU.
-    ComponentCpuHigh,
-    /// Its process ended, or never came up.
-    Exited,
-    /// No heartbeat from the execution thread.
-    Hung,
-    /// Error state without a reason.
-    Error,
-    /// Error state: hardware failed or was disconnected.
-    HardwareLost,
-    /// Error state: the robot behaves abnormally.
-    AbnormalBehaviour,
-    /// Error state: an emergency stop.
-    EmergencyStop,
-    /// The battery is low.
-    BatteryLow,
-    /// The robot takes too much CPU.
-    RobotCpuHigh,
-    /// The radio level is low.
-    RssiLow,
-    /// Links are slow.
-    DelayHigh,
-    /// Links are uneven.
-    JitterHigh,
-    /// Links lose too much.
-    LossHigh,
-    /// The robot is not heard any more.
-    RobotGone,
-}
-
-impl Cause {
-    /// The word that stands in policies, events and reports.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::MemoryShort => "memory-short",
-            Self::ComponentCpuHigh => "component-cpu-high",
-            Self::Exited => "exited",
-            Self::Hung => "hung",
-            Self::Error => "error",
-            Self::HardwareLost => "hardware-lost",
-            Self::AbnormalBehaviour => "abnormal-behaviour",
-            Self::EmergencyStop => "emergency-stop",
-            Self::BatteryLow => "battery-low",
-            Self::RobotCpuHigh => "robot-cpu-high",
-            Self::RssiLow => "rssi-low",
-            Self::DelayHigh => "delay-high",
-            Self::JitterHigh => "jitter-high",
-            Self::LossHigh => "loss-high",
-            Self::RobotGone => "robot-gone",
-        }
-    }
-}
-
-impl core::fmt::Display for Cause {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.pad(self.word())
-    }
-}
 
 /// What to try; the order of variants is the order of severity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -132,8 +68,87 @@ pub struct Evidence {
     pub cpu: Permille,
     /// Its declared CPU need; zero when none was declared.
     pub cpu_limit: Permille,
+    /// Deadlines of readers on this robot that its outputs missed so far; starts anew with
+    /// each instance.
+    pub deadlines_missed: u64,
+    /// Deadlines that its inputs from other robots missed so far; likewise.
+    pub inputs_late: u64,
+    /// What programs of the operator's said last.
+    pub told: Vec<Told>,
     /// Figures of the robot.
     pub robot: RobotEvidence,
+}
+
+/// What a program of the operator's says of one cause of a component.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Told {
+    /// Which cause.
+    pub cause: Cause,
+    /// Whether it is so; `None` when nobody can tell.
+    pub holds: Option<bool>,
+    /// Why, for people.
+    pub reason: String,
+}
+
+/// A program of the operator's that judges what a table cannot say ([`Recovery::programs`]).
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Program {
+    /// A file of the robot's component path, and its arguments.
+    pub command: Vec<String>,
+    /// Time between two runs.
+    pub every: Duration,
+    /// It is ended when it takes longer.
+    pub limit: Duration,
+    /// What counts when it gives no answer.
+    pub otherwise: Otherwise,
+}
+
+/// What counts when a program gives no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Otherwise {
+    /// Nobody can tell: raises nothing and clears nothing.
+    Ignore,
+    /// All its causes hold.
+    Raise,
+    /// None of its causes holds.
+    Clear,
+}
+
+/// How long a component's execution thread may give no sign of life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum HangLimit {
+    /// So many of its periods, and never less than the agent's own least.
+    Periods(u16),
+    /// So long.
+    Time(Duration),
+}
+
+/// One figure over several links.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Spread<T> {
+    /// The least, which is the best for delay, jitter and loss.
+    pub best: T,
+    /// The one in the middle.
+    pub median: T,
+    /// The greatest.
+    pub worst: T,
+}
+
+impl<T: Copy> Spread<T> {
+    /// Of one link.
+    pub fn of_one(value: T) -> Self {
+        Self { best: value, median: value, worst: value }
+    }
+}
+
+impl<T: Ord + Copy> Spread<T> {
+    /// Over `values`; `None` when there are none.
+    pub fn over(mut values: Vec<T>) -> Option<Self> {
+        values.sort_unstable();
+        let (best, worst) = (*values.first()?, *values.last()?);
+        Some(Self { best, median: values[values.len() / 2], worst })
+    }
 }
 
 /// Figures of the robot under a component.
@@ -147,12 +162,12 @@ pub struct RobotEvidence {
     pub battery: Option<Permille>,
     /// Radio level, one raw sample.
     pub rssi: Option<Dbm>,
-    /// Half a round trip, median over the links its connections use.
-    pub delay: Option<Duration>,
-    /// Jitter, median over those links.
-    pub jitter: Option<Duration>,
-    /// Loss, median over those links.
-    pub loss: Option<Permille>,
+    /// Half a round trip, over the links its connections use.
+    pub delay: Option<Spread<Duration>>,
+    /// Jitter, over those links.
+    pub jitter: Option<Spread<Duration>>,
+    /// Loss, over those links.
+    pub loss: Option<Spread<Permille>>,
 }
 
 /// A fault as an event.
@@ -265,15 +280,50 @@ pub trait Recovery {
     /// that another robot can be made ready meanwhile.
     fn foreseen(&self) -> Vec<Foresight>;
 
-    /// Whether the policy says what to do about `cause` at all.
-    fn has_rule(&self, cause: Cause) -> bool;
+    /// Whether the policy says what to do about `cause` of `component` at all.
+    fn has_rule(&self, component: &ComponentKey, cause: Cause) -> bool;
+
+    /// Whether `component` stays as it is until somebody resets it: an emergency stop of
+    /// what moves a body.
+    fn is_latched(&self, _component: &ComponentKey) -> bool {
+        false
+    }
+
+    /// How long the execution thread of `component` may be silent; `None`: as the agent has
+    /// it.
+    fn hang_limit(&self, _component: &ComponentKey) -> Option<HangLimit> {
+        None
+    }
+
+    /// The age of the last news at which the home of `component` counts as gone for it, when
+    /// that is sooner than for the fleet.
+    fn lost_after(&self, _component: &ComponentKey) -> Option<Duration> {
+        None
+    }
+
+    /// Whether [`Self::lost_after`] says anything of any component.
+    fn is_impatient(&self) -> bool {
+        false
+    }
+
+    /// Programs that are to be asked about `component`, and for which causes; their answers
+    /// are evidence.
+    fn programs(&self, _component: &ComponentKey) -> Vec<(Program, Vec<Cause>)> {
+        Vec::new()
+    }
+
+    /// Whether `cause` of `component` is an event rather than a figure over time: it stands
+    /// until the component runs again.
+    fn is_event(&self, _component: &ComponentKey, cause: Cause) -> bool {
+        cause.is_event()
+    }
 
     /// Why nothing should be placed on a robot with these figures now: a bar of its own rules
     /// that they are beyond already, with numbers. Facts that are unknown object to nothing.
     fn objection(&self, robot: &RobotEvidence) -> Option<(Cause, String)>;
 
-    /// How long a component must not come back to a robot that it left for a cause.
-    fn not_back_for(&self) -> Duration;
+    /// How long `component` must not come back to a robot that it left for a cause.
+    fn not_back_for(&self, component: &ComponentKey) -> Duration;
 
     /// How fast standbys follow.
     fn guard(&self) -> GuardPolicy;

@@ -154,6 +154,20 @@ pub struct SuccessionReport {
     pub reason: String,
 }
 
+/// Its agent is away for a planned moment: guards wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HoldReport {
+    /// How long, from when this is heard; more than [`HoldReport::TIME_MAX`] counts as that.
+    pub time: Duration,
+    /// Counts the holds of one life of the agent: each suspends once.
+    pub count: u32,
+}
+
+impl HoldReport {
+    /// Longest hold.
+    pub const TIME_MAX: Duration = Duration::from_secs(5);
+}
+
 /// Everything an author may say, one record each.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Report {
@@ -171,4 +185,6 @@ pub enum Report {
     Homeless(Homeless),
     /// The coordinator's successors.
     Succession(SuccessionReport),
+    /// A planned silence.
+    Hold(HoldReport),
 }

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use crate::{
-    LoadedSystem, RobotConfig, load_allocation, load_recovery, load_robot, load_role, load_system,
+    LoadedSystem, RobotConfig, Scenario, load_allocation, load_recovery, load_robot, load_role,
+    load_scenario, load_system,
     problem::{Mark, Problems, Source},
     read::Reader,
     tree::{Body, parse_yaml},
@@ -22,6 +23,8 @@ pub enum FileKind {
     Recovery,
     /// A policy of the coordinator role.
     Role,
+    /// A scenario of the lab.
+    Scenario,
 }
 
 impl FileKind {
@@ -33,6 +36,7 @@ impl FileKind {
             Self::Allocation => "allocation policy",
             Self::Recovery => "recovery policy",
             Self::Role => "role policy",
+            Self::Scenario => "scenario",
         }
     }
 }
@@ -50,6 +54,8 @@ pub enum LoadedFile {
     Recovery(sdr_recovery::Policy),
     /// A policy of the coordinator role.
     Role(Box<sdr_core::fitness::RolePolicy>),
+    /// A scenario of the lab.
+    Scenario(Box<Scenario>),
 }
 
 impl LoadedFile {
@@ -61,6 +67,7 @@ impl LoadedFile {
             Self::Allocation(_) => FileKind::Allocation,
             Self::Recovery(_) => FileKind::Recovery,
             Self::Role(_) => FileKind::Role,
+            Self::Scenario(_) => FileKind::Scenario,
         }
     }
 }
@@ -81,6 +88,9 @@ pub fn detect(path: &Path) -> Result<FileKind, Problems> {
         | Body::Text(_)
         | Body::List(_) => false,
     };
+    if has("scenario") || has("timeline") {
+        return Ok(FileKind::Scenario);
+    }
     // A system names both policies too, so its own keys come first.
     if has("system") || has("components") {
         return Ok(FileKind::System);
@@ -95,8 +105,7 @@ pub fn detect(path: &Path) -> Result<FileKind, Problems> {
         return Ok(FileKind::Role);
     }
     let mut reader = Reader::new(source);
-    let help =
-        "allowed: a file with the key `system`, `allocation`, `recovery` or `role`, or robot.toml";
+    let help = "allowed: a file with the key `system`, `allocation`, `recovery`, `role` or `scenario`, or robot.toml";
     let start = Mark { line: 1, column: 1, width: 1 };
     reader.problem(start, "nothing says which kind of file this is", Some(help.to_owned()));
     reader.finish(None)
@@ -112,5 +121,8 @@ pub fn load_any(path: &Path) -> Result<LoadedFile, Problems> {
         }
         FileKind::Recovery => load_recovery(path).map(LoadedFile::Recovery),
         FileKind::Role => load_role(path).map(|policy| LoadedFile::Role(Box::new(policy))),
+        FileKind::Scenario => {
+            load_scenario(path).map(|scenario| LoadedFile::Scenario(Box::new(scenario)))
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The files people write: robot.toml, systems and policies; read whole, checked, with a
+//! The files people write: robot.toml, systems, policies and scenarios; read whole, checked, with a
 //! place for every error.
 //!
 //! ```text
@@ -29,6 +29,7 @@ mod tree;
 pub mod units;
 
 pub mod robot;
+pub mod scenario;
 pub mod schema;
 mod system;
 
@@ -39,4 +40,5 @@ pub use policy::{
 };
 pub use problem::{Problem, Problems};
 pub use robot::{RobotConfig, load_robot};
+pub use scenario::{Scenario, load_scenario, parse_scenario};
 pub use system::{LoadedSystem, link_profiles, load_system, parse_system};

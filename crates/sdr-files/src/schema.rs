@@ -1,4 +1,4 @@
-//! JSON schemas of the five kinds of files, from the types that they are read into.
+//! JSON schemas of the six kinds of files, from the types that they are read into.
 
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::Value;
@@ -6,17 +6,19 @@ use serde_json::Value;
 use crate::{
     policy::{AllocationFile, RecoveryFile, RoleFile},
     robot::RobotFile,
+    scenario::ScenarioFile,
     system::SystemFile,
 };
 
 /// Names and texts of all schemas, as they stand in `docs/schemas/NAME.json`.
-pub fn all() -> [(&'static str, String); 5] {
+pub fn all() -> [(&'static str, String); 6] {
     [
         ("robot", text::<RobotFile>("robot.toml")),
         ("system", text::<SystemFile>("system file")),
         ("allocation", text::<AllocationFile>("allocation policy")),
         ("recovery", text::<RecoveryFile>("recovery policy")),
         ("role", text::<RoleFile>("policy of the coordinator role")),
+        ("scenario", text::<ScenarioFile>("scenario of the lab")),
     ]
 }
 

@@ -88,6 +88,9 @@ const DISTANCES: Family =
 const RATES: Family =
     Family { units: &[("mHz", 1), ("Hz", 1_000), ("kHz", 1_000_000)], step: "one mHz" };
 
+const BIT_RATES: Family =
+    Family { units: &[("bit/s", 1), ("kbit/s", 1_000), ("Mbit/s", 1_000_000)], step: "one bit/s" };
+
 /// What [`size`] takes, for errors.
 pub const SIZE_HELP: &str =
     "a size such as 200MB (MB = 10^6, MiB = 2^20; B, kB, MB, GB, TB, KiB, MiB, GiB)";
@@ -101,6 +104,12 @@ pub const LEVEL_HELP: &str = "a radio level such as -52.5dBm (-150dBm to 30dBm, 
 pub const DISTANCE_HELP: &str = "a distance such as 30m (mm, cm, m, km)";
 /// What [`period`] takes, for errors.
 pub const RATE_HELP: &str = "a rate such as 15Hz (mHz, Hz, kHz; 1mHz to 10kHz)";
+
+/// What [`offset_mm`] takes, for errors.
+pub const OFFSET_HELP: &str = "a place such as -3.5m (mm, cm, m, km; -100km to 100km)";
+/// What [`bit_rate`] takes, for errors.
+pub const BIT_RATE_HELP: &str =
+    "a rate such as 20Mbit/s (bit/s, kbit/s, Mbit/s; 1kbit/s to 10000Mbit/s)";
 
 /// An amount of memory: `530MB`, `1.9GB`, `64MiB`.
 pub fn size(text: &str) -> Result<Bytes, UnitError> {
@@ -132,6 +141,23 @@ pub fn level(text: &str) -> Result<Dbm, UnitError> {
 /// A distance in millimetres: `30m`, `1.5km`.
 pub fn distance_mm(text: &str) -> Result<u64, UnitError> {
     u64::try_from(DISTANCES.parse(text)?).map_err(|_| out_of_range(text))
+}
+
+/// A place along a line, in millimetres: `-3.5m`.
+pub fn offset_mm(text: &str) -> Result<i32, UnitError> {
+    let offset = i32::try_from(DISTANCES.parse(text)?).map_err(|_| out_of_range(text))?;
+    match offset.unsigned_abs() <= 100_000_000 {
+        true => Ok(offset),
+        false => Err(out_of_range(text)),
+    }
+}
+
+/// Bits a second: `20Mbit/s`.
+pub fn bit_rate(text: &str) -> Result<u64, UnitError> {
+    match u64::try_from(BIT_RATES.parse(text)?) {
+        Ok(rate) if (1_000..=10_000_000_000).contains(&rate) => Ok(rate),
+        Ok(_) | Err(_) => Err(out_of_range(text)),
+    }
 }
 
 /// The period of a rate, to a nanosecond: `50Hz` is 20 ms.
@@ -213,6 +239,8 @@ mod tests {
         assert_eq!(share("12.5%"), Ok(Permille(125)));
         assert_eq!(level("-52.5dBm"), Ok(Dbm::from_tenths(-525)));
         assert_eq!(distance_mm("30m"), Ok(30_000));
+        assert_eq!(offset_mm("-3.5m"), Ok(-3_500));
+        assert_eq!(bit_rate("20Mbit/s"), Ok(20_000_000));
         assert_eq!(period("15Hz"), Ok(Duration::from_nanos(66_666_666)));
         assert_eq!(period("0.5Hz"), Ok(Duration::from_secs(2)));
     }
@@ -228,6 +256,9 @@ mod tests {
         assert!(matches!(size("99999999999999999999999MB"), Err(UnitError::OutOfRange { .. })));
         assert!(matches!(level("-52.55dBm"), Err(UnitError::TooFine { .. })));
         assert!(matches!(level("75dBm"), Err(UnitError::OutOfRange { .. })));
+        assert!(matches!(offset_mm("101km"), Err(UnitError::OutOfRange { .. })));
+        assert!(matches!(bit_rate("20MBit/s"), Err(UnitError::UnknownUnit { .. })));
+        assert!(matches!(bit_rate("1bit/s"), Err(UnitError::OutOfRange { .. })));
         assert!(matches!(period("0Hz"), Err(UnitError::OutOfRange { .. })));
         let text = size("530Mb").unwrap_err().to_string();
         assert_eq!(text, "`530Mb` has the unknown unit `Mb` (did you mean `MB`?)");

@@ -67,7 +67,10 @@ fn bad_files_are_refused_in_the_words_expected() {
 fn good_files_are_taken() {
     let root = golden().join("../..");
     let policies = ["policies/allocation", "policies/recovery", "policies/role"];
-    for folder in ["tests/golden/good", "systems"].into_iter().chain(policies) {
+    for folder in ["tests/golden/good", "systems", "tests/scenarios", "tests/scenarios/systems"]
+        .into_iter()
+        .chain(policies)
+    {
         for path in files(&root.join(folder)) {
             if let Err(problems) = load(&path) {
                 panic!("{problems}");

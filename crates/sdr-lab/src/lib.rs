@@ -30,6 +30,7 @@
 //! # }
 //! ```
 
+pub mod bed;
 mod cast;
 pub mod device;
 pub mod noise;

@@ -159,7 +159,7 @@ impl Climb {
                 if rung == Rung::LaunchElsewhere {
                     self.refused = self.refused.saturating_add(1);
                     if patient || self.refused < REFUSALS_MAX {
-                        let until = now + limits.retry.pause(self.refused - 1);
+                        let until = now + limits.retry.pause(self.refused);
                         self.phase = Phase::Pausing { until };
                     }
                 }

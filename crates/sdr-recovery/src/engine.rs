@@ -1,12 +1,19 @@
-//! The engine: fresh evidence of all components in, what should be done now out.
+//! The engine of one system: each component goes to those that have the same rules.
 
-use alloc::{boxed::Box, collections::BTreeMap, format, string::String, vec::Vec};
+use alloc::{
+    boxed::Box,
+    collections::{BTreeMap, BTreeSet},
+    format,
+    string::String,
+    vec,
+    vec::Vec,
+};
 use core::time::Duration;
 
 use sdr_core::{
     id::ComponentKey,
     recover::{
-        Cause, CauseStatus, Evidence, Fault, Foresight, GuardPolicy, Recovery, Remedy,
+        Cause, CauseStatus, Evidence, Foresight, GuardPolicy, HangLimit, Program, Recovery,
         RemedyOutcome, RobotEvidence, Verdict,
     },
     spec::PolicyBytes,
@@ -14,17 +21,9 @@ use sdr_core::{
 };
 
 use crate::{
-    budget::Budget,
-    climb::Trouble,
-    condition::Fact,
-    ladder::Rung,
-    policy::{Policy, Rule, Trigger},
-    sustain::{Stage, Sustain},
-    watch::{Scene, Watch, condition_reason, is_of_robot, sustain},
+    group::Group,
+    policy::{Policy, Trigger},
 };
-
-/// Longest reason of a fault that is passed on, in characters.
-const REASON_MAX: usize = 200;
 
 /// Makes the engine of a policy, as the brain takes it; the error is for people.
 pub fn make(policy: &PolicyBytes) -> Result<Box<dyn Recovery + Send>, String> {
@@ -37,314 +36,135 @@ pub fn make(policy: &PolicyBytes) -> Result<Box<dyn Recovery + Send>, String> {
 /// Judges the components of one system by a policy.
 #[derive(Debug)]
 pub struct Engine {
-    policy: Policy,
-    /// Conditions of the robot, by rule: shared, so that all components leave together.
-    robot: BTreeMap<usize, Sustain>,
-    watches: BTreeMap<ComponentKey, Watch>,
-    /// Moves are remembered when their component has left, so that it cannot be thrown back
-    /// and forth for ever.
-    moves: BTreeMap<ComponentKey, Budget>,
-    judged_at: Instant,
+    /// The first is for all without exceptions.
+    groups: Vec<Group>,
+    /// Components with exceptions, and their group.
+    exceptions: BTreeMap<String, usize>,
 }
 
 impl Engine {
     /// An engine at rest.
     pub fn new(policy: Policy) -> Self {
-        Self {
-            policy,
-            robot: BTreeMap::new(),
-            watches: BTreeMap::new(),
-            moves: BTreeMap::new(),
-            judged_at: Instant::ZERO,
+        let mut groups = vec![Group::new(policy.for_component(""))];
+        let mut exceptions = BTreeMap::new();
+        for exception in &policy.parts().exceptions {
+            exceptions.insert(exception.component.clone(), groups.len());
+            groups.push(Group::new(policy.for_component(&exception.component)));
         }
+        Self { groups, exceptions }
     }
 
-    fn feed(&mut self, now: Instant, evidence: &[Evidence]) {
-        // Nothing is known of the robot of a component that is gone.
-        let here = evidence.iter().find(|one| !is_gone(one));
-        for (index, rule) in self.policy.parts().rules.iter().enumerate() {
-            let Trigger::Condition(condition) = rule.trigger else {
-                continue;
-            };
-            if is_shared(condition.fact) {
-                if let Some(here) = here {
-                    let sustain =
-                        self.robot.entry(index).or_insert_with(|| Sustain::new(condition));
-                    sustain.feed(now, condition.fact.read(here));
-                }
-                continue;
-            }
-            for one in evidence {
-                let watch = self.watches.entry(one.component.clone()).or_default();
-                let sustain = watch.own.entry(index).or_insert_with(|| Sustain::new(condition));
-                sustain.feed(now, condition.fact.read(one));
-            }
-        }
-        for one in evidence {
-            let watch = self.watches.entry(one.component.clone()).or_default();
-            (watch.seen_at, watch.actuator) = (now, one.actuator);
-        }
+    fn number(&self, component: &ComponentKey) -> usize {
+        self.exceptions.get(component.name.as_str()).copied().unwrap_or(0)
     }
 
-    /// Whose turn it is for a raised cause of the robot that is first met here, one component
-    /// after the other: the largest that nothing else is done for. Nobody's while one climbs.
-    fn turn<'a>(&self, rule: usize, evidence: &'a [Evidence]) -> Option<&'a Evidence> {
-        let sustain = self.robot.get(&rule).filter(|sustain| sustain.raised())?;
-        if !self.is_one_by_one(&self.policy.parts().rules[rule]) {
-            return None;
-        }
-        let watch = |one: &Evidence| self.watches.get(&one.component);
-        let climbs = |one: &Evidence| {
-            let climb = watch(one).and_then(|watch| watch.climb.as_ref());
-            climb.is_some_and(|climb| climb.trouble.rule == rule)
-        };
-        let free = |one: &&Evidence| {
-            watch(one).is_some_and(|watch| watch.is_free_for(rule)) && !is_gone(one)
-        };
-        let size = |one: &Evidence| match sustain.condition().fact {
-            Fact::RobotCpu => u64::from(one.cpu.0),
-            Fact::RobotMemoryFree
-            | Fact::RobotBattery
-            | Fact::RobotRssi
-            | Fact::ComponentCpuOfLimit
-            | Fact::ComponentCpuOfCore
-            | Fact::LinksDelay
-            | Fact::LinksJitter
-            | Fact::LinksLoss => one.memory.0,
-        };
-        if evidence.iter().any(climbs) {
-            return None;
-        }
-        evidence.iter().filter(free).min_by_key(|one| (u64::MAX - size(one), &one.component))
+    fn group(&self, component: &ComponentKey) -> &Group {
+        &self.groups[self.number(component)]
     }
 
-    /// A cause of the robot whose ladder begins here: freeing one component may be enough.
-    fn is_one_by_one(&self, rule: &Rule) -> bool {
-        match self.policy.ladder(rule, false).rungs().first() {
-            Some(Rung::LocalStandby | Rung::Restart(_)) => is_of_robot(rule),
-            Some(Rung::StandbyElsewhere | Rung::LaunchElsewhere | Rung::Hold) | None => false,
-        }
+    fn group_mut(&mut self, component: &ComponentKey) -> &mut Group {
+        let number = self.number(component);
+        &mut self.groups[number]
     }
 
-    /// Causes that stand for a component now, but those that go by turns.
-    fn troubles(&self, now: Instant, one: &Evidence) -> Vec<Trouble> {
-        let trouble = |(index, rule): (usize, &Rule)| match rule.trigger {
-            Trigger::Fault => {
-                let fault = one.fault.as_ref().filter(|fault| fault.cause == rule.cause)?;
-                let reason = fault_reason(fault);
-                Some(Trouble { rule: index, since: now, held_over_at: now, reason })
-            }
-            Trigger::Condition(_) => {
-                let by_turns = self.robot.contains_key(&index) && self.is_one_by_one(rule);
-                if by_turns { None } else { self.condition_trouble(now, one, index) }
-            }
-        };
-        self.policy.parts().rules.iter().enumerate().filter_map(trouble).collect()
-    }
-
-    /// The condition of a rule, when it is raised and its figure is known for the component.
-    fn condition_trouble(&self, now: Instant, one: &Evidence, rule: usize) -> Option<Trouble> {
-        let seen = sustain(&self.watches.get(&one.component)?.own, &self.robot, rule)?;
-        let condition = seen.condition();
-        let known = !is_gone(one) && condition.fact.read(one).is_some();
-        let held_over_at = seen.held_over_at().filter(|_| known)?;
-        let since = held_over_at - condition.hold;
-        Some(Trouble { rule, since, held_over_at, reason: condition_reason(seen, now) })
-    }
-
-    /// Whether a condition that is not raised yet will send a component away, and how.
-    fn foresee(&self, component: &ComponentKey, watch: &Watch, index: usize) -> Option<Foresight> {
-        let parts = self.policy.parts();
-        let rule = &parts.rules[index];
-        let seen = sustain(&watch.own, &self.robot, index)?;
-        let Stage::Pending { since } = seen.stage() else { return None };
-        let remedy = match self.policy.ladder(rule, watch.actuator).rungs().first()? {
-            Rung::StandbyElsewhere => Remedy::StandbyElsewhere,
-            Rung::LaunchElsewhere => Remedy::LaunchElsewhere,
-            Rung::LocalStandby | Rung::Restart(_) | Rung::Hold => return None,
-        };
-        let hold = seen.condition().hold;
-        let wait = hold * parts.limits.prepare_after.0 / 1000;
-        let held = self.judged_at.since(since);
-        let moves = self.moves.get(component);
-        let may_move = moves.is_none_or(|moves| {
-            moves.clone().has_room(self.judged_at, parts.limits.moves_per_hour)
-        });
-        (held >= wait && wait < hold && may_move && watch.is_free_for(index)).then(|| Foresight {
-            component: component.clone(),
-            cause: rule.cause,
-            remedy,
-            hold,
-            reason: condition_reason(seen, self.judged_at),
-        })
-    }
-
-    fn judge_one(&mut self, now: Instant, one: &Evidence, troubles: Vec<Trouble>) -> Vec<Verdict> {
-        let Some(watch) = self.watches.get_mut(&one.component) else {
-            return Vec::new();
-        };
-        let moves = self.moves.entry(one.component.clone()).or_default();
-        let (policy, robot) = (&self.policy, &self.robot);
-        watch.judge(&mut Scene { now, policy, robot, evidence: one, moves }, troubles)
+    fn trigger(&self, component: &ComponentKey, cause: Cause) -> Option<&Trigger> {
+        let rules = &self.group(component).policy().parts().rules;
+        rules.iter().find(|rule| rule.cause == cause).map(|rule| &rule.trigger)
     }
 }
 
 impl Recovery for Engine {
     fn judge(&mut self, now: Instant, evidence: &[Evidence]) -> Vec<Verdict> {
-        self.judged_at = now;
-        if evidence.is_empty() {
-            // Nobody tells how the robot is, so nothing is known of the time until somebody does.
-            self.robot.clear();
+        if let [only] = self.groups.as_mut_slice() {
+            return only.judge(now, evidence);
         }
-        self.feed(now, evidence);
-        let mut verdicts = Vec::new();
+        let mut parts: Vec<Vec<Evidence>> = vec![Vec::new(); self.groups.len()];
         for one in evidence {
-            let troubles = self.troubles(now, one);
-            verdicts.extend(self.judge_one(now, one, troubles));
+            parts[self.number(&one.component)].push(one.clone());
         }
-        for rule in 0..self.policy.parts().rules.len() {
-            if let Some(one) = self.turn(rule, evidence) {
-                let troubles = self.condition_trouble(now, one, rule).into_iter().collect();
-                verdicts.extend(self.judge_one(now, one, troubles));
-            }
-        }
-        self.moves.retain(|_, moves| !moves.is_idle(now));
-        verdicts
+        let judged = self.groups.iter_mut().zip(&parts);
+        judged.flat_map(|(group, part)| group.judge(now, part)).collect()
     }
 
     fn outcome(&mut self, now: Instant, component: &ComponentKey, outcome: RemedyOutcome) {
-        let Some(watch) = self.watches.get_mut(component) else {
-            return;
-        };
-        let Some(climb) = &mut watch.climb else {
-            return;
-        };
-        let parts = self.policy.parts();
-        let rule = &parts.rules[climb.trouble.rule];
-        let ladder = self.policy.ladder(rule, watch.actuator);
-        if climb.outcome(now, outcome, (ladder, &parts.limits, is_of_robot(rule))) {
-            watch.missed = None;
-            let moves = self.moves.entry(component.clone()).or_default();
-            moves.spend(now, parts.limits.moves_per_hour);
-        }
+        self.group_mut(component).outcome(now, component, outcome);
     }
 
     fn forget(&mut self, component: &ComponentKey) {
-        let Some(watch) = self.watches.remove(component) else {
-            return;
-        };
-        if let Some(climb) = watch.climb {
-            let parts = self.policy.parts();
-            let ladder = self.policy.ladder(&parts.rules[climb.trouble.rule], watch.actuator);
-            if climb.is_leaving(ladder) {
-                let moves = self.moves.entry(component.clone()).or_default();
-                moves.spend(self.judged_at, parts.limits.moves_per_hour);
-            }
-        }
-        if self.watches.is_empty() {
-            self.robot.clear();
-        }
+        self.group_mut(component).forget(component);
     }
 
     fn next_deadline(&self) -> Option<Instant> {
-        // What was not shown in the last call could not act on its deadline either.
-        let due = |watch: &Watch| {
-            let deadline = watch.deadline(self.judged_at);
-            deadline.filter(|at| watch.seen_at == self.judged_at || *at > self.judged_at)
-        };
-        let robot = self.robot.values().filter_map(|sustain| sustain.deadline(self.judged_at));
-        let robot = robot.filter(|at| *at > self.judged_at);
-        robot.chain(self.watches.values().filter_map(due)).min()
+        self.groups.iter().filter_map(Group::next_deadline).min()
     }
 
     fn standing(&self) -> Vec<CauseStatus> {
-        let mut standing = Vec::new();
-        for (component, watch) in &self.watches {
-            for (index, rule) in self.policy.parts().rules.iter().enumerate() {
-                let (component, cause) = (component.clone(), rule.cause);
-                let status = match sustain(&watch.own, &self.robot, index) {
-                    Some(seen) => condition_status(seen, self.judged_at),
-                    None => fault_status(watch, index),
-                };
-                if let Some((since, hold, raised, reason)) = status {
-                    let status = CauseStatus { component, cause, since, hold, raised, reason };
-                    standing.push(status);
-                }
-            }
-        }
-        standing
+        self.groups.iter().flat_map(Group::standing).collect()
     }
 
     fn foreseen(&self) -> Vec<Foresight> {
-        let mut foreseen = Vec::new();
-        for (component, watch) in &self.watches {
-            let of = |rule| self.foresee(component, watch, rule);
-            foreseen.extend((0..self.policy.parts().rules.len()).filter_map(of));
-        }
-        foreseen
+        self.groups.iter().flat_map(Group::foreseen).collect()
     }
 
-    fn has_rule(&self, cause: Cause) -> bool {
-        self.policy.parts().rules.iter().any(|rule| rule.cause == cause)
+    fn has_rule(&self, component: &ComponentKey, cause: Cause) -> bool {
+        self.trigger(component, cause).is_some()
+    }
+
+    fn is_latched(&self, component: &ComponentKey) -> bool {
+        self.group(component).is_latched(component)
+    }
+
+    fn hang_limit(&self, component: &ComponentKey) -> Option<HangLimit> {
+        match self.trigger(component, Cause::Hung)? {
+            Trigger::Silent(limit) => Some(*limit),
+            Trigger::Fault
+            | Trigger::Condition(_)
+            | Trigger::Lost(_)
+            | Trigger::Expression(..)
+            | Trigger::Program(..) => None,
+        }
+    }
+
+    fn is_impatient(&self) -> bool {
+        let rules = self.groups.iter().flat_map(|group| &group.policy().parts().rules);
+        rules.into_iter().any(|rule| matches!(rule.trigger, Trigger::Lost(_)))
+    }
+
+    fn lost_after(&self, component: &ComponentKey) -> Option<Duration> {
+        match self.trigger(component, Cause::RobotGone)? {
+            Trigger::Lost(time) => Some(*time),
+            Trigger::Fault
+            | Trigger::Condition(_)
+            | Trigger::Silent(_)
+            | Trigger::Expression(..)
+            | Trigger::Program(..) => None,
+        }
+    }
+
+    fn programs(&self, component: &ComponentKey) -> Vec<(Program, Vec<Cause>)> {
+        let mut programs: BTreeMap<Program, BTreeSet<Cause>> = BTreeMap::new();
+        for rule in &self.group(component).policy().parts().rules {
+            if let Trigger::Program(program, _) = &rule.trigger {
+                programs.entry(program.clone()).or_default().insert(rule.cause);
+            }
+        }
+        programs.into_iter().map(|(program, causes)| (program, Vec::from_iter(causes))).collect()
+    }
+
+    fn is_event(&self, component: &ComponentKey, cause: Cause) -> bool {
+        let trigger = self.trigger(component, cause);
+        trigger.is_none_or(|trigger| trigger.condition().is_none())
     }
 
     fn objection(&self, robot: &RobotEvidence) -> Option<(Cause, String)> {
-        self.policy.parts().rules.iter().find_map(|rule| {
-            let Trigger::Condition(condition) = rule.trigger else { return None };
-            let found = condition.fact.read_robot(robot)?;
-            let bar = condition.bar;
-            bar.holds(found.raw()).then(|| {
-                let (fact, bar) = (condition.fact.label(), bar.level());
-                (rule.cause, format!("{}: {fact} {found}, bar {bar}", rule.cause))
-            })
-        })
+        self.groups[0].objection(robot)
+    }
+
+    fn not_back_for(&self, component: &ComponentKey) -> Duration {
+        self.group(component).policy().parts().limits.not_back_for
     }
 
     fn guard(&self) -> GuardPolicy {
-        self.policy.parts().limits.guard
-    }
-
-    fn not_back_for(&self) -> Duration {
-        self.policy.parts().limits.not_back_for
-    }
-}
-
-fn condition_status(seen: &Sustain, now: Instant) -> Option<(Instant, Duration, bool, String)> {
-    let (since, raised) = match seen.stage() {
-        Stage::Calm => return None,
-        Stage::Pending { since } => (since, false),
-        Stage::Raised { since, .. } => (since, true),
-    };
-    Some((since, seen.condition().hold, raised, condition_reason(seen, now)))
-}
-
-/// A fault stands as long as it is climbed for or held.
-fn fault_status(watch: &Watch, rule: usize) -> Option<(Instant, Duration, bool, String)> {
-    let climb = watch.climb.as_ref().map(|climb| &climb.trouble);
-    let held = watch.held.get(&rule).map(|held| &held.trouble);
-    let trouble = climb.filter(|trouble| trouble.rule == rule).or(held)?;
-    Some((trouble.since, Duration::ZERO, true, trouble.reason.clone()))
-}
-
-fn fault_reason(fault: &Fault) -> String {
-    match fault.reason.trim() {
-        "" => fault.cause.word().into(),
-        reason => reason.chars().take(REASON_MAX).collect(),
-    }
-}
-
-fn is_gone(evidence: &Evidence) -> bool {
-    evidence.fault.as_ref().is_some_and(|fault| fault.cause == Cause::RobotGone)
-}
-
-/// Whether all components of a robot see the same figure.
-fn is_shared(fact: Fact) -> bool {
-    match fact {
-        Fact::RobotMemoryFree | Fact::RobotCpu | Fact::RobotBattery | Fact::RobotRssi => true,
-        Fact::ComponentCpuOfLimit
-        | Fact::ComponentCpuOfCore
-        | Fact::LinksDelay
-        | Fact::LinksJitter
-        | Fact::LinksLoss => false,
+        self.groups[0].policy().parts().limits.guard
     }
 }

@@ -53,7 +53,7 @@ pub struct Restart {
     pub tries: NonZeroU8,
     /// Quiet time that counts as healed.
     pub settle: Duration,
-    /// Pause before each try.
+    /// Pause before each try but the first.
     pub backoff: Backoff,
 }
 
@@ -68,20 +68,22 @@ impl Default for Restart {
     }
 }
 
-/// A pause that doubles with each try, between two bounds.
+/// A pause that doubles with each try, between two bounds. The first try of a climb is made at
+/// once: what ran well until now most often runs well again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Backoff {
-    /// Before the first try.
+    /// Before the second try.
     pub min: Duration,
     /// Never longer than this.
     pub max: Duration,
 }
 
 impl Backoff {
-    /// The pause before try `tried` + 1: `min`, then twice as long each time, up to `max`.
+    /// The pause before try `tried` + 1: none, `min`, then twice as long each time, up to `max`.
     pub fn pause(&self, tried: u32) -> Duration {
+        let Some(paused) = tried.checked_sub(1) else { return Duration::ZERO };
         // 2^20 times any pause that makes sense is past any bound that does.
-        let doubled = self.min.saturating_mul(1 << tried.min(20));
+        let doubled = self.min.saturating_mul(1 << paused.min(20));
         doubled.min(self.max)
     }
 }
@@ -214,7 +216,7 @@ mod tests {
     fn pauses_double_up_to_their_bound() {
         let backoff = Restart::default().backoff;
         let pauses: Vec<u128> = (0..7).map(|tried| backoff.pause(tried).as_millis()).collect();
-        assert_eq!(pauses, [200, 400, 800, 1600, 3200, 5000, 5000]);
+        assert_eq!(pauses, [0, 200, 400, 800, 1600, 3200, 5000]);
         assert_eq!(backoff.pause(u32::MAX), Duration::from_secs(5));
     }
 }

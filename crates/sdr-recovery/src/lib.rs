@@ -60,6 +60,9 @@
 //!     memory: Bytes::mega(530),
 //!     cpu: Permille(200),
 //!     cpu_limit: Permille(0),
+//!     deadlines_missed: 0,
+//!     inputs_late: 0,
+//!     told: vec![],
 //!     robot: RobotEvidence::default(),
 //! }]);
 //!
@@ -72,23 +75,40 @@
 extern crate alloc;
 
 mod condition;
+mod expression;
+mod fact;
 mod ladder;
+mod level;
 mod policy;
+mod policy_error;
 mod table_iii;
+mod wire;
 
+mod counts;
 mod smooth;
 mod sustain;
+mod tally;
 
 mod budget;
 mod climb;
 mod watch;
 
 mod engine;
+mod explain;
+mod group;
 
-pub use condition::{Bar, Clear, Condition, Fact, Level, RSSI_MEDIAN_OVER, Unit};
+pub use condition::{Bar, Clear, Condition, RSSI_MEDIAN_OVER};
 pub use engine::{Engine, make};
-pub use ladder::{Backoff, Ladder, LadderError, RUNGS_MAX, Restart, Rung};
-pub use policy::{
-    Limits, MEDIAN_OVER_MAX, POLICY_VERSION, Policy, PolicyError, PolicyParts, Return, Rule,
-    Trigger,
+pub use explain::{Explained, ExplainedComponent, ExplainedRule, explain};
+pub use expression::{
+    DEPTH_MAX, Expression, ExpressionError, Kind, NODES_MAX, Named, SOURCE_BYTES_MAX, names,
 };
+pub use fact::{Fact, Over};
+pub use ladder::{Backoff, Ladder, LadderError, RUNGS_MAX, Restart, Rung};
+pub use level::{Level, Unit};
+pub use policy::{
+    EVERY_MIN, Exception, HANG_MIN, LADDERS_MAX, LOST_MIN, Limits, MEDIAN_OVER_MAX, PER_MAX,
+    Policy, PolicyParts, RULES_MAX, Return, Rule, Trigger,
+};
+pub use policy_error::PolicyError;
+pub use wire::POLICY_VERSION;

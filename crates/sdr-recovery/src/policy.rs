@@ -4,24 +4,33 @@ use alloc::{string::String, vec::Vec};
 use core::time::Duration;
 
 use sdr_core::{
-    recover::{Cause, GuardPolicy},
-    spec::PolicyBytes,
+    recover::{Cause, GuardPolicy, HangLimit, Program},
     units::Permille,
 };
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use crate::{
-    condition::{Bar, Condition},
+    condition::Condition,
+    expression::Expression,
     ladder::{Backoff, Ladder},
+    policy_error::{PolicyError, check},
     table_iii,
 };
 
-/// First byte of an encoded policy; raised when fields change.
-pub const POLICY_VERSION: u8 = 3;
-
 /// Longest window over which samples are smoothed; it bounds what is kept.
 pub const MEDIAN_OVER_MAX: Duration = Duration::from_secs(60);
+/// Longest time in which is counted.
+pub const PER_MAX: Duration = Duration::from_secs(3600);
+/// Most ladders of a policy.
+pub const LADDERS_MAX: usize = 32;
+/// Most rules for one component.
+pub const RULES_MAX: usize = 64;
+/// The least silence of an execution thread that can be told from a busy machine.
+pub const HANG_MIN: Duration = Duration::from_millis(300);
+/// The least silence of a robot that can be told from a lossy link.
+pub const LOST_MIN: Duration = Duration::from_millis(300);
+/// The least time between two runs of a program.
+pub const EVERY_MIN: Duration = Duration::from_millis(200);
 
 /// A checked recovery policy.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,6 +50,21 @@ pub struct PolicyParts {
     pub rules: Vec<Rule>,
     /// Bounds over all rules.
     pub limits: Limits,
+    /// What differs for single components.
+    pub exceptions: Vec<Exception>,
+}
+
+/// What differs for one component.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Exception {
+    /// Its name within the system.
+    pub component: String,
+    /// Rules that it has instead of those of the same cause, or besides.
+    pub rules: Vec<Rule>,
+    /// Causes for which it has no rule.
+    pub without: Vec<Cause>,
+    /// Its own bounds.
+    pub limits: Option<Limits>,
 }
 
 /// One row of the table: a cause, how it is seen, and what to climb.
@@ -57,13 +81,33 @@ pub struct Rule {
 }
 
 /// How a cause is seen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Trigger {
     /// It is reported as a fault: exit, hang, error state, robot gone.
     Fault,
     /// A fact crosses a bar for some time.
     Condition(Condition),
+    /// The execution thread is silent for longer than this; for [`Cause::Hung`].
+    Silent(HangLimit),
+    /// Its robot is silent for longer than this; for [`Cause::RobotGone`].
+    Lost(Duration),
+    /// An expression is true for some time.
+    Expression(Expression, Condition),
+    /// A program says so for some time.
+    Program(Program, Condition),
+}
+
+impl Trigger {
+    /// What is watched over time; `None` for what is reported as it happens.
+    pub fn condition(&self) -> Option<Condition> {
+        match self {
+            Self::Fault | Self::Silent(_) | Self::Lost(_) => None,
+            Self::Condition(condition)
+            | Self::Expression(_, condition)
+            | Self::Program(_, condition) => Some(*condition),
+        }
+    }
 }
 
 impl Rule {
@@ -76,6 +120,17 @@ impl Rule {
     pub fn on_condition(cause: Cause, condition: Condition, ladder: &str) -> Self {
         let trigger = Trigger::Condition(condition);
         Self { cause, trigger, ladder: ladder.into(), actuator: None }
+    }
+
+    /// Whether the fault lies with the robot or its links: then other robots are asked for
+    /// ever.
+    pub fn is_of_robot(&self) -> bool {
+        match &self.trigger {
+            Trigger::Fault | Trigger::Lost(_) => self.cause == Cause::RobotGone,
+            Trigger::Silent(_) | Trigger::Program(..) => false,
+            Trigger::Condition(condition) => condition.fact.is_of_robot(),
+            Trigger::Expression(expression, _) => expression.is_of_robot(),
+        }
     }
 
     /// The same, but what moves a body climbs `ladder`.
@@ -129,124 +184,72 @@ impl Default for Limits {
     }
 }
 
-/// Why a policy is none. The author of the file can mend it; nothing was changed.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum PolicyError {
-    /// Not bytes that [`Policy::encode`] made.
-    #[error("the bytes of the policy cannot be read")]
-    Unreadable,
-    /// Made by a later version.
-    #[error("policy version {found}; this agent reads up to {POLICY_VERSION}")]
-    Version {
-        /// The version found.
-        found: u8,
-    },
-    /// Two ladders of one name.
-    #[error("ladder `{0}` is there twice")]
-    LadderTwice(String),
-    /// Two rules for one cause.
-    #[error("cause {0} has two rules")]
-    CauseTwice(Cause),
-    /// A rule climbs a ladder that is not there.
-    #[error("{cause} climbs `{ladder}`, which is no ladder of this policy")]
-    UnknownLadder {
-        /// The rule.
-        cause: Cause,
-        /// The name that it gives.
-        ladder: String,
-    },
-    /// The bar is in another unit than the fact.
-    #[error("{cause}: {fact} is {wanted}, found {found}")]
-    Unit {
-        /// The rule.
-        cause: Cause,
-        /// The fact.
-        fact: &'static str,
-        /// What it is measured in.
-        wanted: &'static str,
-        /// What was given.
-        found: String,
-    },
-    /// The release level lies on the bad side of the bar.
-    #[error("{cause}: clear at {clear} is inside the fault ({bar})")]
-    ClearInside {
-        /// The rule.
-        cause: Cause,
-        /// The release level.
-        clear: String,
-        /// The bar.
-        bar: String,
-    },
-    /// A window that would keep too many samples.
-    #[error("{cause}: median over {found_ms} ms; at most {} ms", MEDIAN_OVER_MAX.as_millis())]
-    MedianTooLong {
-        /// The rule.
-        cause: Cause,
-        /// What was given.
-        found_ms: u64,
-    },
-    /// More than the whole hold time.
-    #[error("limits: prepare_after is {} %; at most 100 %", .0.0 / 10)]
-    PrepareAfter(Permille),
-    /// The greatest pause is under the least.
-    #[error("limits: the greatest pause of retry is under its least, or the least is zero")]
-    Retry,
-}
-
 impl Policy {
     /// The policy of these parts, when they fit together.
     pub fn new(parts: PolicyParts) -> Result<Self, PolicyError> {
-        for (index, (name, _)) in parts.ladders.iter().enumerate() {
-            if parts.ladders[..index].iter().any(|(other, _)| other == name) {
-                return Err(PolicyError::LadderTwice(name.clone()));
-            }
-        }
-        for (index, rule) in parts.rules.iter().enumerate() {
-            if parts.rules[..index].iter().any(|other| other.cause == rule.cause) {
-                return Err(PolicyError::CauseTwice(rule.cause));
-            }
-            for ladder in core::iter::once(&rule.ladder).chain(&rule.actuator) {
-                if !parts.ladders.iter().any(|(name, _)| name == ladder) {
-                    let (cause, ladder) = (rule.cause, ladder.clone());
-                    return Err(PolicyError::UnknownLadder { cause, ladder });
-                }
-            }
-            match &rule.trigger {
-                Trigger::Fault => {}
-                Trigger::Condition(condition) => check_condition(rule.cause, condition)?,
-            }
-        }
-        let retry = parts.limits.retry;
-        if retry.min.is_zero() || retry.max < retry.min {
-            return Err(PolicyError::Retry);
-        }
-        let share = parts.limits.prepare_after;
-        if share.0 > 1000 {
-            return Err(PolicyError::PrepareAfter(share));
-        }
+        check(&parts)?;
         Ok(Self(parts))
     }
 
-    /// The policy in `policy`; empty bytes mean [`Policy::default`].
-    pub fn decode(policy: &PolicyBytes) -> Result<Self, PolicyError> {
-        let Some((version, rest)) = policy.bytes.split_first() else {
-            return Ok(Self::default());
-        };
-        if *version != POLICY_VERSION {
-            return Err(PolicyError::Version { found: *version });
+    /// The rules and bounds of one component, without exceptions.
+    pub fn for_component(&self, component: &str) -> Self {
+        let mut parts = self.0.clone();
+        for exception in core::mem::take(&mut parts.exceptions) {
+            if exception.component != component {
+                continue;
+            }
+            parts.rules.retain(|rule| !exception.without.contains(&rule.cause));
+            for rule in exception.rules {
+                match parts.rules.iter_mut().find(|other| other.cause == rule.cause) {
+                    Some(other) => *other = rule,
+                    None => parts.rules.push(rule),
+                }
+            }
+            parts.limits = exception.limits.unwrap_or(parts.limits);
         }
-        let parts: PolicyParts = postcard::from_bytes(rest).map_err(|_| PolicyError::Unreadable)?;
-        Self::new(parts)
+        // Every part of it was checked with the whole.
+        Self(parts)
     }
 
-    /// The policy as systems carry it: a version byte, then postcard.
-    pub fn encode(&self) -> PolicyBytes {
-        let mut bytes = alloc::vec![POLICY_VERSION];
-        bytes.extend(
-            postcard::to_allocvec(&self.0).expect("writing plain data to memory cannot fail"),
-        );
-        PolicyBytes { name: self.0.name.clone(), bytes }
+    /// The same, and `component` has the rules and bounds of `own`.
+    pub fn with_exception(&self, component: &str, own: &Self) -> Result<Self, PolicyError> {
+        let mut parts = self.0.clone();
+        // A ladder of the same name that is another one needs another name.
+        let mut names: Vec<(&String, String)> = Vec::new();
+        for (name, ladder) in &own.0.ladders {
+            let known = parts.ladders.iter().find(|(other, _)| other == name);
+            let renamed = match known {
+                Some((_, other)) if other == ladder => name.clone(),
+                Some(_) => alloc::format!("{name} of {component}"),
+                None => name.clone(),
+            };
+            let is_climbed = own
+                .0
+                .rules
+                .iter()
+                .any(|rule| rule.ladder == *name || rule.actuator.as_ref() == Some(name));
+            if is_climbed && !parts.ladders.iter().any(|(other, _)| *other == renamed) {
+                parts.ladders.push((renamed.clone(), ladder.clone()));
+            }
+            names.push((name, renamed));
+        }
+        let renamed = |name: &String| {
+            let found = names.iter().find(|(other, _)| *other == name);
+            found.map_or_else(|| name.clone(), |(_, renamed)| renamed.clone())
+        };
+        let rules = own.0.rules.iter().map(|rule| Rule {
+            ladder: renamed(&rule.ladder),
+            actuator: rule.actuator.as_ref().map(renamed),
+            ..rule.clone()
+        });
+        let has = |cause: Cause| own.0.rules.iter().any(|rule| rule.cause == cause);
+        parts.exceptions.push(Exception {
+            component: component.into(),
+            rules: rules.filter(|rule| !self.0.rules.contains(rule)).collect(),
+            without: self.0.rules.iter().map(|one| one.cause).filter(|one| !has(*one)).collect(),
+            limits: (own.0.limits != self.0.limits).then_some(own.0.limits),
+        });
+        Self::new(parts)
     }
 
     /// Its parts, to read or to make another policy from.
@@ -280,102 +283,5 @@ impl TryFrom<PolicyParts> for Policy {
 impl From<Policy> for PolicyParts {
     fn from(policy: Policy) -> Self {
         policy.0
-    }
-}
-
-fn check_condition(cause: Cause, condition: &Condition) -> Result<(), PolicyError> {
-    let bar = condition.bar.level();
-    let clear = condition.clear.map(|clear| clear.level);
-    for level in core::iter::once(bar).chain(clear) {
-        if level.unit() != condition.fact.unit() {
-            return Err(PolicyError::Unit {
-                cause,
-                fact: condition.fact.word(),
-                wanted: condition.fact.unit().example(),
-                found: alloc::format!("{level}"),
-            });
-        }
-    }
-    if let Some(clear) = clear {
-        let inside = match condition.bar {
-            Bar::AtMost(_) => clear.raw() < bar.raw(),
-            Bar::AtLeast(_) => clear.raw() > bar.raw(),
-        };
-        if inside {
-            let (clear, bar) = (alloc::format!("{clear}"), alloc::format!("{bar}"));
-            return Err(PolicyError::ClearInside { cause, clear, bar });
-        }
-    }
-    if condition.median_over > MEDIAN_OVER_MAX {
-        let found_ms = u64::try_from(condition.median_over.as_millis()).unwrap_or(u64::MAX);
-        return Err(PolicyError::MedianTooLong { cause, found_ms });
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use alloc::{format, vec};
-
-    use sdr_core::units::{Bytes, Dbm};
-
-    use super::*;
-    use crate::{
-        condition::{Fact, Level},
-        ladder::Rung,
-    };
-
-    fn one_rule(rule: Rule) -> Result<Policy, PolicyError> {
-        Policy::new(PolicyParts {
-            name: "one".into(),
-            ladders: vec![("stop".into(), Ladder::new(vec![Rung::Hold]).unwrap())],
-            rules: vec![rule],
-            limits: Limits::default(),
-        })
-    }
-
-    fn rssi(bar: Level) -> Condition {
-        Condition::new(Fact::RobotRssi, Bar::AtMost(bar), Duration::from_secs(6))
-    }
-
-    #[test]
-    fn a_policy_survives_the_wire_and_fits_a_fleet_record() {
-        let policy = Policy::default();
-        let encoded = policy.encode();
-
-        assert!(encoded.bytes.len() < 600, "{} bytes", encoded.bytes.len());
-        assert_eq!(Policy::decode(&encoded), Ok(policy));
-        assert_eq!(Policy::decode(&PolicyBytes::default()), Ok(Policy::default()));
-    }
-
-    #[test]
-    fn broken_and_later_bytes_are_refused() {
-        let mut bytes = Policy::default().encode();
-        bytes.bytes[0] = 7;
-        assert_eq!(Policy::decode(&bytes), Err(PolicyError::Version { found: 7 }));
-
-        bytes.bytes[0] = POLICY_VERSION;
-        bytes.bytes.truncate(40);
-        assert_eq!(Policy::decode(&bytes), Err(PolicyError::Unreadable));
-    }
-
-    #[test]
-    fn a_rule_needs_its_ladder_its_unit_and_a_release_outside_the_fault() {
-        let lost = Rule::on_fault(Cause::Exited, "up");
-        let text = format!("{}", one_rule(lost).unwrap_err());
-        assert_eq!(text, "exited climbs `up`, which is no ladder of this policy");
-
-        let size = rssi(Level::Memory(Bytes::mega(5)));
-        let text =
-            format!("{}", one_rule(Rule::on_condition(Cause::RssiLow, size, "stop")).unwrap_err());
-        assert_eq!(text, "rssi-low: robot.rssi is a level such as -80dBm, found 5.0 MB");
-
-        let level = |tenths| Level::Signal(Dbm::from_tenths(tenths));
-        let inside = rssi(level(-525)).clear(level(-526), Duration::from_secs(1));
-        let text = format!(
-            "{}",
-            one_rule(Rule::on_condition(Cause::RssiLow, inside, "stop")).unwrap_err()
-        );
-        assert_eq!(text, "rssi-low: clear at -52.6 dBm is inside the fault (-52.5 dBm)");
     }
 }

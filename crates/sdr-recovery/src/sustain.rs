@@ -1,12 +1,14 @@
 //! A condition over time: it must hold for long before it is raised, and be gone for long
 //! before it is over.
 
+use alloc::string::String;
 use core::time::Duration;
 
 use sdr_core::time::Instant;
 
 use crate::{
-    condition::{Clear, Condition, Level},
+    condition::{Clear, Condition},
+    level::Level,
     smooth::Smoother,
 };
 
@@ -16,6 +18,8 @@ pub(crate) struct Sustain {
     condition: Condition,
     smoother: Smoother,
     stage: Stage,
+    /// Why it holds, where the figure does not say it.
+    pub(crate) note: String,
 }
 
 /// How far it is.
@@ -39,7 +43,8 @@ pub(crate) enum Stage {
 
 impl Sustain {
     pub(crate) fn new(condition: Condition) -> Self {
-        Self { condition, smoother: Smoother::new(condition.median_over), stage: Stage::Calm }
+        let smoother = Smoother::new(condition.median_over);
+        Self { condition, smoother, stage: Stage::Calm, note: String::new() }
     }
 
     /// Takes a fresh figure; `None` when nobody can tell.
@@ -156,7 +161,7 @@ mod tests {
     use sdr_core::units::{Bytes, Dbm};
 
     use super::*;
-    use crate::condition::{Bar, Fact};
+    use crate::{condition::Bar, fact::Fact};
 
     fn at(millis: u64) -> Instant {
         Instant::from_millis(millis)

@@ -4,14 +4,16 @@ use alloc::vec;
 use core::time::Duration;
 
 use sdr_core::{
-    recover::Cause,
+    recover::{Cause, HangLimit},
     units::{Bytes, Dbm, Permille},
 };
 
 use crate::{
-    condition::{Bar, Condition, Fact, Level},
+    condition::{Bar, Condition},
+    fact::Fact,
     ladder::{Ladder, Restart, Rung},
-    policy::{Limits, Policy, PolicyParts, Rule},
+    level::Level,
+    policy::{Limits, Policy, PolicyParts, Rule, Trigger},
 };
 
 const LOCAL_FIRST: &str = "local-first";
@@ -41,12 +43,13 @@ pub(crate) fn policy() -> Policy {
         (ELSEWHERE.into(), ladder(vec![Rung::StandbyElsewhere, Rung::LaunchElsewhere, Rung::Hold])),
         (STOP.into(), ladder(vec![Rung::Hold])),
     ];
-    let parts = PolicyParts { name: "default".into(), ladders, rules, limits: Limits::default() };
+    let (limits, exceptions) = (Limits::default(), vec![]);
+    let parts = PolicyParts { name: "default".into(), ladders, rules, limits, exceptions };
     Policy::new(parts).expect("the table names its own ladders and units")
 }
 
 /// Upper half: try here first.
-fn resolved_by_restarting() -> [Rule; 5] {
+fn resolved_by_restarting() -> [Rule; 6] {
     let memory = Condition::new(
         Fact::RobotMemoryFree,
         Bar::AtMost(Level::Memory(Bytes::mega(100))),
@@ -62,8 +65,20 @@ fn resolved_by_restarting() -> [Rule; 5] {
         Rule::on_condition(Cause::MemoryShort, memory, LOCAL_FIRST),
         Rule::on_condition(Cause::ComponentCpuHigh, cpu, LOCAL_FIRST),
         Rule::on_fault(Cause::Exited, LOCAL_FIRST),
-        Rule::on_fault(Cause::Hung, LOCAL_FIRST),
+        Rule {
+            trigger: Trigger::Silent(HangLimit::Periods(5)),
+            ..Rule::on_fault(Cause::Hung, LOCAL_FIRST)
+        },
         Rule::on_fault(Cause::Error, LOCAL_FIRST),
+        // Only for connections that have a deadline.
+        Rule::on_condition(
+            Cause::DeadlineMissed,
+            Condition {
+                hold: Duration::from_secs(2),
+                ..Condition::rate(Fact::DeadlineMisses, 5, Duration::from_secs(1))
+            },
+            LOCAL_FIRST,
+        ),
     ]
 }
 

@@ -4,16 +4,17 @@ use alloc::{collections::BTreeMap, string::String, vec::Vec};
 use core::time::Duration;
 
 use sdr_core::{
-    recover::{Cause, Evidence, Remedy, Verdict},
+    recover::{Evidence, Remedy, Verdict},
     time::Instant,
 };
 
 use crate::{
     budget::Budget,
     climb::{Climb, Look, Order, Signs, Trouble, Way},
-    condition::Fact,
+    counts::Counts,
     ladder::Rung,
-    policy::{Policy, Rule, Trigger},
+    level::{Level, Unit},
+    policy::{Policy, Rule},
     sustain::{Stage, Sustain},
 };
 
@@ -26,6 +27,8 @@ const MOVE_MAX: Duration = Duration::from_secs(5);
 pub(crate) struct Watch {
     /// Conditions of its own, by rule.
     pub(crate) own: BTreeMap<usize, Sustain>,
+    /// What happens to it is counted.
+    counts: Counts,
     pub(crate) climb: Option<Climb>,
     pub(crate) held: BTreeMap<usize, Held>,
     /// A fault that came while a move was under way, and when it is dealt with here if the
@@ -61,6 +64,38 @@ pub(crate) struct Scene<'a> {
 }
 
 impl Watch {
+    /// Takes fresh evidence for the conditions of its own.
+    pub(crate) fn feed(&mut self, now: Instant, seen: &Evidence, rules: &[Rule]) {
+        (self.seen_at, self.actuator) = (now, seen.actuator);
+        let Self { own, counts, .. } = self;
+        counts.feed(now, seen, rules);
+        for (index, rule) in rules.iter().enumerate() {
+            let Some(condition) = rule.trigger.condition().filter(|one| !one.fact.is_shared())
+            else {
+                continue;
+            };
+            let sustain = own.entry(index).or_insert_with(|| Sustain::new(condition));
+            match condition.fact.unit() {
+                Unit::Rate => sustain.feed(now, Some(counts.level(now, index))),
+                Unit::Flag => {
+                    let (holds, note) = counts.told(now, rule, seen);
+                    if holds != Some(false) {
+                        sustain.note = note;
+                    }
+                    sustain.feed(now, holds.map(Level::Flag));
+                }
+                Unit::Memory | Unit::Share | Unit::Signal | Unit::Time => {
+                    sustain.feed(now, condition.fact.read(seen, condition.over));
+                }
+            }
+        }
+    }
+
+    /// A remedy was done for `rule`: what it counts begins from nothing.
+    pub(crate) fn count_anew(&mut self, rule: usize) {
+        self.counts.clear(rule);
+    }
+
     /// Says what should be done now about `troubles`: one order, after the causes that it is
     /// held for from now on.
     pub(crate) fn judge(
@@ -96,7 +131,7 @@ impl Watch {
         };
         let ladder = scene.policy.ladder(&rules(scene.policy)[climb.trouble.rule], self.actuator);
         if let Some(worse) = winner.clone().filter(|worse| {
-            let of_robot = is_of_robot(&rules(scene.policy)[worse.rule]);
+            let of_robot = rules(scene.policy)[worse.rule].is_of_robot();
             !climb.makes_wait(worse.rule, of_robot) && first(worse.rule) > climb.severity(ladder)
         }) {
             return self.start(scene, worse);
@@ -104,7 +139,7 @@ impl Watch {
         let (leaving, pausing) = (climb.is_leaving(ladder), climb.is_pausing());
         let fault = fault.filter(|fault| fault.rule != climb.trouble.rule);
         if let Some(fault) = fault.clone()
-            && is_of_robot(&rules(scene.policy)[climb.trouble.rule])
+            && rules(scene.policy)[climb.trouble.rule].is_of_robot()
             && (leaving || pausing)
             && self.missed.is_none()
         {
@@ -160,7 +195,8 @@ impl Watch {
         let climb = self.climb.as_ref().and_then(Climb::deadline);
         let held = self.held.values().filter_map(|held| held.until);
         let missed = self.missed.as_ref().map(|(due, _)| *due).filter(|due| *due > now);
-        own.chain(climb).chain(held).chain(missed).min()
+        let counts = self.counts.falls_at().filter(|at| *at > now);
+        own.chain(climb).chain(held).chain(missed).chain(counts).min()
     }
 
     /// Ends the holds that are over, and gives back the troubles that are to be tried again.
@@ -205,7 +241,7 @@ impl Watch {
                 evidence: scene.evidence,
                 restarts: &mut self.restarts,
                 moves: scene.moves,
-                patient: is_of_robot(rule),
+                patient: rule.is_of_robot(),
             },
         );
         let (cause, held_over_at) = (rule.cause, climb.trouble.held_over_at);
@@ -245,11 +281,6 @@ impl Watch {
 /// `rssi -54.8 dBm, bar -52.5 dBm, held 6.0 s`.
 pub(crate) fn condition_reason(sustain: &Sustain, now: Instant) -> String {
     let condition = sustain.condition();
-    let (fact, bar) = (condition.fact.label(), condition.bar.level());
-    let found = match sustain.found(now) {
-        Some(found) => alloc::format!("{found}"),
-        None => String::from("unknown"),
-    };
     let tenths = |time: Duration| {
         let tenths = time.as_millis() / 100;
         alloc::format!("{}.{}", tenths / 10, tenths % 10)
@@ -262,23 +293,26 @@ pub(crate) fn condition_reason(sustain: &Sustain, now: Instant) -> String {
         }
         Stage::Raised { since, .. } => alloc::format!("held {} s", tenths(now.since(since))),
     };
-    alloc::format!("{fact} {found}, bar {bar}, {held}")
+    alloc::format!("{}, {held}", found_words(sustain, now))
 }
 
-/// Whether the fault lies with the robot or its links: then other robots are asked for ever.
-pub(crate) fn is_of_robot(rule: &Rule) -> bool {
-    match rule.trigger {
-        Trigger::Fault => rule.cause == Cause::RobotGone,
-        Trigger::Condition(condition) => match condition.fact {
-            Fact::ComponentCpuOfLimit | Fact::ComponentCpuOfCore => false,
-            Fact::RobotMemoryFree
-            | Fact::RobotCpu
-            | Fact::RobotBattery
-            | Fact::RobotRssi
-            | Fact::LinksDelay
-            | Fact::LinksJitter
-            | Fact::LinksLoss => true,
-        },
+/// `rssi -54.8 dBm, bar -52.5 dBm`, `exits 3 in 60.0 s, bar 3`, or what was told.
+fn found_words(sustain: &Sustain, now: Instant) -> String {
+    let condition = sustain.condition();
+    let (fact, bar) = (condition.fact.label(), condition.bar.level());
+    let found = match sustain.found(now) {
+        Some(found) => alloc::format!("{found}"),
+        None => String::from("unknown"),
+    };
+    match condition.fact.unit() {
+        Unit::Flag => sustain.note.clone(),
+        Unit::Rate => {
+            let per = condition.per.as_secs_f64();
+            alloc::format!("{fact} {found} in {per:.1} s, bar {bar}")
+        }
+        Unit::Memory | Unit::Share | Unit::Signal | Unit::Time => {
+            alloc::format!("{fact} {found}, bar {bar}")
+        }
     }
 }
 
@@ -301,7 +335,7 @@ fn signs(own: &BTreeMap<usize, Sustain>, scene: &Scene<'_>, rule: usize) -> Sign
 }
 
 fn is_fault(policy: &Policy, rule: usize) -> bool {
-    matches!(rules(policy)[rule].trigger, Trigger::Fault)
+    rules(policy)[rule].trigger.condition().is_none()
 }
 
 fn first_severity(policy: &Policy, rule: usize, actuator: bool) -> u8 {

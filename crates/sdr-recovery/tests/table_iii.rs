@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use build::{Scene, at, key, orders, restart_after};
 use sdr_core::{
-    recover::{Cause, Recovery, Remedy, RemedyOutcome, RobotEvidence},
+    recover::{Cause, Recovery, Remedy, RemedyOutcome, RobotEvidence, Spread},
     units::{Bytes, Dbm, Permille},
 };
 use sdr_recovery::Policy;
@@ -43,7 +43,7 @@ fn short_memory_restarts_the_largest_component_first_and_one_at_a_time() {
     assert_eq!(verdicts.len(), 1);
     assert_eq!(verdicts[0].0, 3_000);
     assert_eq!(verdicts[0].1.component, key("anomaly"));
-    assert_eq!(verdicts[0].1.remedy, restart_after(200));
+    assert_eq!(verdicts[0].1.remedy, restart_after(0));
     assert_eq!(verdicts[0].1.reason, "memory_free 100 MB, bar 100 MB, held 2.0 s; restart 1 of 3");
 }
 
@@ -62,7 +62,7 @@ fn short_memory_that_restarting_does_not_mend_moves_the_component_then_takes_the
     }
     assert_eq!(
         seen,
-        [restart_after(200), restart_after(400), restart_after(800), Remedy::LaunchElsewhere]
+        [restart_after(0), restart_after(200), restart_after(400), Remedy::LaunchElsewhere]
     );
 
     scene.leaves("anomaly");
@@ -100,7 +100,7 @@ fn a_component_that_takes_too_much_cpu_is_restarted_and_its_neighbour_left_alone
 
     assert_eq!(verdicts[0].0, 11_000);
     assert_eq!(verdicts[0].1.cause, Cause::ComponentCpuHigh);
-    assert_eq!(verdicts[0].1.remedy, restart_after(200));
+    assert_eq!(verdicts[0].1.remedy, restart_after(0));
     assert_eq!(verdicts.len(), 1);
 }
 
@@ -124,7 +124,7 @@ fn exits_hangs_and_errors_without_a_reason_are_restarted_here() {
         let mut scene = scene();
         let verdicts = scene.fails(5, "anomaly", cause);
         assert_eq!(verdicts.len(), 1);
-        assert_eq!((verdicts[0].cause, verdicts[0].remedy), (cause, restart_after(200)));
+        assert_eq!((verdicts[0].cause, verdicts[0].remedy), (cause, restart_after(0)));
         assert_eq!(verdicts[0].held_over_at, at(5));
         assert!(scene.judge_at(6).is_empty(), "an order is given once");
     }
@@ -218,9 +218,9 @@ fn a_low_radio_level_moves_all_components_half_a_second_and_six_after_it_fell() 
 fn delay_jitter_and_loss_move_all_components_after_six_seconds() {
     let millis = Duration::from_millis;
     let rows = [
-        first(|robot| robot.delay = Some(millis(200))),
-        first(|robot| robot.jitter = Some(millis(100))),
-        first(|robot| robot.loss = Some(Permille(200))),
+        first(|robot| robot.delay = Some(Spread::of_one(millis(200)))),
+        first(|robot| robot.jitter = Some(Spread::of_one(millis(100)))),
+        first(|robot| robot.loss = Some(Spread::of_one(Permille(200)))),
     ];
     let causes = [Cause::DelayHigh, Cause::JitterHigh, Cause::LossHigh];
     for ((at, found, orders), cause) in rows.into_iter().zip(causes) {
@@ -247,9 +247,9 @@ fn just_beside_every_bar_nothing_happens() {
             cpu: Some(Permille(949)),
             battery: Some(Permille(151)),
             rssi: Some(Dbm::from_tenths(-799)),
-            delay: Some(Duration::from_micros(199_999)),
-            jitter: Some(Duration::from_micros(99_999)),
-            loss: Some(Permille(199)),
+            delay: Some(Spread::of_one(Duration::from_micros(199_999))),
+            jitter: Some(Spread::of_one(Duration::from_micros(99_999))),
+            loss: Some(Spread::of_one(Permille(199))),
         };
     });
     scene.all[0].cpu = Permille(949);

@@ -230,9 +230,32 @@ state = {state:?}
 }
 
 impl Drop for Agent {
+    /// Components outlive their agent: they are ended first, those of a killed agent by the
+    /// numbers in its journal.
     fn drop(&mut self) {
+        if self.process.is_some() {
+            self.sdr(&["stop", "--timeout", "10s"]);
+        }
         self.stop();
+        let journal = fs::read(self.state().join("processes.json")).unwrap_or_default();
+        let left: Vec<serde_json::Value> = serde_json::from_slice(&journal).unwrap_or_default();
+        for entry in left {
+            let (pid, key) = (entry["pid"].as_u64(), entry["component"].as_str());
+            let pid = pid.and_then(|pid| u32::try_from(pid).ok());
+            if let (Some(pid), Some(key)) = (pid, key)
+                && is_component(pid, key)
+            {
+                kill(pid);
+            }
+        }
     }
+}
+
+/// Whether a process was started as this component.
+fn is_component(pid: u32, key: &str) -> bool {
+    let environment = fs::read(format!("/proc/{pid}/environ")).unwrap_or_default();
+    let wanted = format!("SDR_COMPONENT={key}");
+    is_running(pid) && environment.split(|byte| *byte == 0).any(|one| one == wanted.as_bytes())
 }
 
 /// A TCP port of loopback that is free now.

@@ -1,8 +1,11 @@
 //! Brains of two and three robots in virtual time.
 
+mod adoption;
 mod again;
 mod deployment;
+mod own_recovery;
 mod policies;
 mod recovery;
 mod role;
+mod rules;
 mod standby;

@@ -95,6 +95,7 @@ fn a_system_whose_policies_another_version_wrote_runs_by_the_defaults() {
                 | Effect::Command { .. }
                 | Effect::Routes(_)
                 | Effect::Plan { .. }
+                | Effect::Ask(_)
                 | Effect::Answer { .. } => {}
             }
         }

@@ -121,6 +121,26 @@ fn the_old_home_goes_on_until_the_new_one_is_heard() {
 }
 
 #[test]
+fn what_must_be_apart_stays_apart_whichever_of_the_two_says_so() {
+    let mut fleet = Fleet::new(3, 31);
+    (0..3).for_each(|number| fleet.set_rssi(number, -47.0));
+    fleet.run(Duration::from_secs(2));
+    let mut pair = exploration();
+    pair.components.truncate(2);
+    pair.connections.truncate(1);
+    let other = pair.components[0].name.clone();
+    pair.components[1].place.apart_from.push(other);
+    fleet.deploy(0, &pair);
+    fleet.run_until(LONG, "all active", |fleet| fleet.is_running("exploration"));
+    assert_eq!(fleet.home("exploration", "anomaly").as_deref(), Some("robot-2"));
+
+    fleet.set_rssi(0, -55.0);
+    fleet.run_until(LONG, "moved", |fleet| !fleet.events("moved").is_empty());
+
+    assert_eq!(fleet.home("exploration", "fisheye").as_deref(), Some("robot-3"));
+}
+
+#[test]
 fn nothing_comes_back_by_itself_when_the_radio_is_fine_again() {
     let mut fleet = deployed(3);
     fleet.set_rssi(0, -55.0);
@@ -143,9 +163,8 @@ fn a_crash_is_restarted_at_home_under_the_same_epoch_and_a_greater_run() {
     assert_eq!((camera.home.as_deref(), camera.epoch, camera.run), (Some("robot-2"), 1, 2));
     let launches: usize = fleet.robots.iter().map(|robot| robot.launches).sum();
     assert_eq!(launches, 6, "one start for one crash\n{}", fleet.story());
-    let exited = fleet.events("exited")[0].0;
-    let started = fleet.events("started").last().unwrap().0;
-    assert!(started.since(exited) >= Duration::from_millis(200), "the backoff is kept");
+    let restarts = fleet.events("restart");
+    assert_eq!(restarts[0].1.numbers["after_ms"], 0.0, "the first try comes at once");
 }
 
 #[test]

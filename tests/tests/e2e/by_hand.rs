@@ -37,24 +37,6 @@ fn a_killed_component_runs_again_at_home() {
 }
 
 #[test]
-fn a_killed_agent_ends_its_leftovers_and_brings_its_components_back() {
-    let mut house = deployed();
-    let old = house.agents[2].component_pid("position").unwrap();
-    let run = house.component("position").unwrap().run;
-
-    house.agents[2].kill();
-    house.agents[2].start();
-
-    house.wait("position again", |house| {
-        house.component("position").is_some_and(|position| {
-            position.home.as_deref() == Some("robot-3") && position.run > run
-        }) && (0..3).all(|number| house.is_running(number))
-    });
-    assert!(!is_running(old), "the leftover process {old} lives on");
-    assert_eq!(house.component("position").unwrap().epoch, 1);
-}
-
-#[test]
 fn a_robot_that_stays_away_loses_its_components_to_the_others() {
     let mut house = deployed();
     let pid = house.agents[2].component_pid("position").unwrap();

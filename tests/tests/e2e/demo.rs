@@ -13,7 +13,7 @@ use serde_json::Value;
 const FIVE: [&str; 5] = ["fisheye", "anomaly", "camera", "controller", "position"];
 
 /// Processes whose environment names `folder`: all that a demo with this TMPDIR started.
-fn processes_of(folder: &Path) -> Vec<u32> {
+pub(super) fn processes_of(folder: &Path) -> Vec<u32> {
     let words = folder.to_string_lossy().into_owned();
     let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
     entries

@@ -4,5 +4,8 @@ mod by_hand;
 mod demo;
 mod garbage;
 mod keys;
+mod lab;
+mod life;
+mod limits;
 mod role;
 mod standby;

@@ -49,8 +49,11 @@ fn gather(folder: &Path, prefix: &str, pages: &mut Vec<Page>) {
         let name = entry.file_name().into_string().expect("names of files are UTF-8");
         let path = format!("{prefix}{name}");
         if entry.file_type().expect("every file has a type").is_dir() {
-            // A demo leaves its report where it was started.
-            if !MADE.contains(&name.as_str()) && !name.starts_with("sdr-demo-") {
+            // A demo or a scenario leaves its report where it was started.
+            if !MADE.contains(&name.as_str())
+                && !name.starts_with("sdr-demo-")
+                && !name.starts_with("sdr-lab-")
+            {
                 gather(&entry.path(), &format!("{path}/"), pages);
             }
         } else if let Ok(text) = fs::read_to_string(entry.path()) {

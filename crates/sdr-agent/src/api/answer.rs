@@ -57,7 +57,7 @@ impl IntoResponse for Refusal {
 pub(super) async fn no_such_path(State(state): State<ApiState>, uri: Uri) -> Refusal {
     let error = format!(
         "no `{}` here; there are /v1/status, /v1/deploy, /v1/systems/NAME, /v1/role/move, \
-         /v1/role/policy, /v1/events, \
+         /v1/role/policy, /v1/stop, /v1/events, \
          /v1/logs/SYSTEM/COMPONENT, /v1/components, /v1/plan, /v1/recording, /v1/health, \
          /v1/keys, /v1/blobs, /v1/blobs/HASH",
         uri.path()
@@ -72,7 +72,7 @@ pub(super) async fn wrong_method(
     uri: Uri,
 ) -> Refusal {
     let error = format!(
-        "{method} is not for {}; POST is for /v1/deploy, /v1/role/..., /v1/keys and /v1/blobs, DELETE for /v1/systems/NAME, GET for \
+        "{method} is not for {}; POST is for /v1/deploy, /v1/role/..., /v1/stop, /v1/keys and /v1/blobs, DELETE for /v1/systems/NAME, GET for \
          all others",
         uri.path()
     );

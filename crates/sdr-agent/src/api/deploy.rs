@@ -66,7 +66,7 @@ pub(super) async fn undeploy(
 fn system_answer(accepted: Accepted) -> Result<Json<DeployAnswer>, Refusal> {
     match accepted {
         Accepted::System(answer) => Ok(Json(answer)),
-        Accepted::Role(_) => Err(Refusal::crossed()),
+        Accepted::Role(_) | Accepted::Reset(_) => Err(Refusal::crossed()),
     }
 }
 

@@ -10,7 +10,9 @@ mod events;
 mod keys;
 mod logs;
 mod remote;
+mod reset;
 mod role;
+mod stop;
 mod views;
 
 use std::collections::BTreeMap;
@@ -31,7 +33,7 @@ use sdr_core::{
 };
 use thiserror::Error;
 use tokio::net::{TcpListener, UnixListener, UnixStream};
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinHandle;
 
 use crate::blobs::{BLOB_BYTES_MAX, Streams};
@@ -40,6 +42,7 @@ use crate::events::Events;
 use crate::installed::Installed;
 use crate::mesh::keys::FleetKeys;
 use crate::record::Flusher;
+use crate::run::Ending;
 use crate::supervisor::LogFiles;
 use crate::trouble::Trouble;
 pub(crate) use components::Profiles;
@@ -77,6 +80,8 @@ pub(crate) struct ApiState {
     pub(crate) keys: Option<FleetKeys>,
     /// `None` when the mesh is plain.
     pub(crate) streams: Option<Streams>,
+    /// Ends the agent.
+    pub(crate) ending: watch::Sender<Ending>,
 }
 
 /// The plan that was made last, empty before the first.
@@ -223,8 +228,10 @@ fn router(state: ApiState) -> Router {
         .route("/v1/recording", get(views::recording))
         .route("/v1/deploy", post(deploy::deploy))
         .route("/v1/systems/{name}", delete(deploy::undeploy))
+        .route("/v1/reset", post(reset::reset))
         .route("/v1/role/move", post(role::hand_over))
         .route("/v1/role/policy", post(role::set_policy))
+        .route("/v1/stop", post(stop::stop))
         .route("/v1/events", get(events::events))
         .route("/v1/logs/{system}/{component}", get(logs::logs))
         .route("/v1/components", get(components::components))

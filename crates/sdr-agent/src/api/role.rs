@@ -40,6 +40,6 @@ pub(super) async fn set_policy(
 fn role_answer(accepted: Accepted) -> Result<Json<RoleAnswer>, Refusal> {
     match accepted {
         Accepted::Role(answer) => Ok(Json(answer)),
-        Accepted::System(_) => Err(Refusal::crossed()),
+        Accepted::System(_) | Accepted::Reset(_) => Err(Refusal::crossed()),
     }
 }

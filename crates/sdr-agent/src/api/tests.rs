@@ -33,7 +33,7 @@ impl Bench {
         let bin = vec![dir.path().join("bin")];
         let state = ApiState {
             robot,
-            installed: Installed::new(bin.clone(), facts(), sender.clone()),
+            installed: Installed::new((bin.clone(), vec![]), facts(), sender.clone()),
             inputs: sender,
             questions: asker,
             desk: AnswerDesk::default(),
@@ -46,6 +46,7 @@ impl Bench {
             profiles: Profiles::new(bin),
             keys: None,
             streams: None,
+            ending: watch::channel(Ending::NotYet).0,
         };
         let listener = open(&path).await.unwrap();
         let api = Api::start(path, listener, None, state.clone());

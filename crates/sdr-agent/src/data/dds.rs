@@ -6,7 +6,7 @@ mod raw;
 use std::{
     cell::RefCell,
     collections::BTreeMap,
-    net::Ipv4Addr,
+    net::{Ipv4Addr, UdpSocket},
     pin::Pin,
     sync::Arc,
     task::{Context, Poll, Waker},
@@ -34,6 +34,10 @@ use super::{
     transport::{Arrival, EndpointId, Matched, SendError, Topic, Transport, TransportError, Way},
 };
 
+/// Ports of one domain (RTPS 2.3, section 9.6.1.1).
+const DOMAIN_PORTS: u16 = 250;
+/// Port for samples to all, of domain 0.
+const SAMPLES_PORT: u16 = 7401;
 /// Largest body that is surely not fragmented, on links with an MTU of 576 and more.
 const WHOLE_BYTES_MAX: usize = 440;
 /// Samples a reliable writer may have unacknowledged.
@@ -66,6 +70,17 @@ struct Writer {
     unacknowledged_bytes: u64,
 }
 
+/// Holds the port on which a participant would hear samples sent to all, while it is made: it then
+/// announces none, and samples come to it alone.
+///
+/// A writer prefers to send to all when a reader allows it. By Wi-Fi that is the slowest rate and no
+/// retry: pictures that way filled the air and were lost. Discovery has another port and stays as it
+/// is. `None` when somebody else holds the port; then nothing is different from before.
+fn hold_multicast_port(domain_id: u16) -> Option<UdpSocket> {
+    let port = domain_id.checked_mul(DOMAIN_PORTS)?.checked_add(SAMPLES_PORT)?;
+    UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port)).ok()
+}
+
 impl Dds {
     /// Joins a DDS domain by these addresses of the robot, or by all it has; takes some tens
     /// of milliseconds.
@@ -82,7 +97,10 @@ impl Dds {
         if !addresses.is_empty() {
             builder = builder.with_only_networks(addresses.iter().copied());
         }
-        let participant = builder.build().map_err(failed)?;
+        let participant = {
+            let _held = hold_multicast_port(domain_id);
+            builder.build().map_err(failed)?
+        };
         let publisher = participant.create_publisher(&qos).map_err(failed)?;
         let subscriber = participant.create_subscriber(&qos).map_err(failed)?;
         Ok(Self {

@@ -3,17 +3,19 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use sdr_core::{lifecycle::LifecycleState, spec::Execution, time::Instant};
+use sdr_core::{lifecycle::LifecycleState, recover::HangLimit, spec::Execution, time::Instant};
 
 use super::Patience;
 
 /// Periods without a beat that are still fine.
-const BEATS_MISSED_MAX: u32 = 5;
+const BEATS_MISSED_MAX: u16 = 5;
 
 /// What one process is waited for.
 #[derive(Debug)]
 pub(super) struct Life {
     patience: Patience,
+    /// The period of a periodic component.
+    period: Duration,
     /// Longest pause between two beats while active.
     beat_max: Duration,
     /// Longest pause between two beats while inactive.
@@ -29,6 +31,8 @@ pub(super) struct Life {
     unlinked_at: Option<Instant>,
     /// Whether it was seen initialised.
     initialized: bool,
+    /// Whether it is to greet after the death of an agent.
+    returning: bool,
     /// Whether the present delay was told.
     told: bool,
 }
@@ -37,6 +41,8 @@ pub(super) struct Life {
 enum Phase {
     /// The process runs; it has not greeted yet.
     Starting,
+    /// It outlived an agent, and has not greeted this one yet.
+    Returning,
     /// It was configured; `on_initialize` runs.
     Initializing,
     /// Beats are due, a few.
@@ -92,9 +98,10 @@ impl Life {
             Execution::Periodic { period } => period,
             Execution::OnData => Duration::ZERO,
         };
-        let missed_max = period.saturating_mul(BEATS_MISSED_MAX);
+        let missed_max = period.saturating_mul(BEATS_MISSED_MAX.into());
         Self {
             patience,
+            period,
             beat_max: patience.beat.max(missed_max),
             beat_idle_max: patience.beat_idle.max(missed_max),
             phase: Phase::Starting,
@@ -103,8 +110,31 @@ impl Life {
             order_since: now,
             unlinked_at: None,
             initialized: false,
+            returning: false,
             told: false,
         }
+    }
+
+    /// Takes it for hung after this silence while active; `None`: after the usual one.
+    pub(super) fn be_patient(&mut self, limit: Option<HangLimit>) {
+        let usual = HangLimit::Periods(BEATS_MISSED_MAX);
+        self.beat_max = match limit.unwrap_or(usual) {
+            HangLimit::Periods(periods) => {
+                self.patience.beat.max(self.period.saturating_mul(periods.into()))
+            }
+            HangLimit::Time(limit) => limit,
+        };
+    }
+
+    /// It ran before this agent did, and greets soon.
+    pub(super) fn adopted(&mut self) {
+        self.phase = Phase::Returning;
+        self.returning = true;
+    }
+
+    /// Whether its first greeting after the death of an agent is still to come.
+    pub(super) fn is_returning(&self) -> bool {
+        self.returning
     }
 
     /// `configure` was sent.
@@ -161,6 +191,7 @@ impl Life {
 
     /// It connected, anew or at first.
     pub(super) fn linked(&mut self, now: Instant) {
+        self.returning = false;
         if self.unlinked_at.take().is_some() {
             self.told = false;
             self.restart_beats(now);
@@ -195,6 +226,7 @@ impl Life {
         match self.phase {
             Phase::Finishing | Phase::Terminating | Phase::Killed => true,
             Phase::Starting
+            | Phase::Returning
             | Phase::Initializing
             | Phase::Inactive
             | Phase::Active
@@ -236,6 +268,7 @@ impl Life {
         let patience = &self.patience;
         let (limit, what) = match self.phase {
             Phase::Starting => (patience.hello, What::Greeting),
+            Phase::Returning => (patience.reconnect, What::Greeting),
             Phase::Initializing => (patience.initialize, What::Initialized),
             Phase::Inactive | Phase::Active | Phase::Error if !self.orders.is_empty() => {
                 return self.sooner(self.wait_for_answer());
@@ -264,6 +297,7 @@ impl Life {
         let matters = match self.phase {
             Phase::Initializing | Phase::Inactive | Phase::Active | Phase::Error => true,
             Phase::Starting
+            | Phase::Returning
             | Phase::Finalized
             | Phase::Finishing
             | Phase::Terminating
@@ -288,6 +322,7 @@ impl Life {
         // News of a component that is being ended do not stop its end.
         let rank = |phase| match phase {
             Phase::Starting
+            | Phase::Returning
             | Phase::Initializing
             | Phase::Inactive
             | Phase::Active

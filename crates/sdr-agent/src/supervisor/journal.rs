@@ -9,12 +9,15 @@ use std::path::{Path, PathBuf};
 use sdr_core::input::InstanceId;
 use serde::{Deserialize, Serialize};
 
+use super::keepsake::Keepsake;
 use crate::metrics::process::parse_start_time;
 
 const FILE_NAME: &str = "processes.json";
 
 /// One process, named so that it cannot be mistaken for another.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+///
+/// Fields are only appended: agents of the versions before and after read this list too.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Entry {
     /// The component's key.
     pub(super) component: String,
@@ -28,6 +31,10 @@ pub(super) struct Entry {
     pub(super) boot_id: String,
     /// What it runs.
     pub(super) executable: PathBuf,
+    /// A [`Keepsake`], kept as it stands so that an unknown one costs only the adoption; none
+    /// in lists of agents that did not adopt.
+    #[serde(default)]
+    pub(super) keepsake: serde_json::Value,
 }
 
 /// The list on disk: replaced as a whole at each start and end. It need not survive a
@@ -51,17 +58,23 @@ impl Journal {
     }
 
     /// A process was started.
-    pub(super) fn add(&self, component: String, instance: InstanceId, pid: u32, program: &Path) {
+    pub(super) fn add(&self, instance: InstanceId, pid: u32, program: &Path, keepsake: &Keepsake) {
         let entry = Entry {
-            component,
+            component: keepsake.component.to_string(),
             instance,
             pid,
             start_time: start_time(pid).unwrap_or(0),
             boot_id: self.boot_id.clone(),
             executable: program.into(),
+            keepsake: serde_json::to_value(keepsake).unwrap_or_default(),
         };
         self.entries.borrow_mut().insert(instance, entry);
         self.write();
+    }
+
+    /// Whether no process is left.
+    pub(super) fn is_empty(&self) -> bool {
+        self.entries.borrow().is_empty()
     }
 
     /// A process was reaped.
@@ -83,10 +96,15 @@ impl Journal {
 pub(super) fn read(dir: &Path) -> Vec<Entry> {
     let path = dir.join(FILE_NAME);
     let Ok(text) = fs::read_to_string(&path) else { return Vec::new() };
-    serde_json::from_str(&text).unwrap_or_else(|error| {
+    let complain = |error: serde_json::Error| {
         tracing::error!(event = "journal-unreadable", path = %path.display(), %error);
+    };
+    let entries: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap_or_else(|error| {
+        complain(error);
         Vec::new()
-    })
+    });
+    let entry = |value| serde_json::from_value(value).map_err(complain).ok();
+    entries.into_iter().filter_map(entry).collect()
 }
 
 fn write(path: &Path, entries: &[Entry]) -> io::Result<()> {

@@ -1,12 +1,13 @@
 //! One task a process: from its start to its end, which is told exactly once.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::rc::Rc;
 
 use rustix::process::Signal;
 use sdr_component::protocol::{
-    Configure, ErrorReport, FromComponent, Hello, LineBuffer, Order, PROTOCOL_VERSION, StateReport,
-    ToComponent,
+    Configure, ErrorReport, FromComponent, Hello, InputCounters, LineBuffer, Order,
+    PROTOCOL_VERSION, StateReport, ToComponent,
 };
 use sdr_core::{
     effect::{Command, LaunchOrder},
@@ -18,10 +19,11 @@ use tokio::net::UnixStream;
 use tokio::sync::mpsc;
 
 use super::instance::{Life, Overdue};
+use super::pidfd::End;
 use super::process::Process;
 use super::{Shared, samples, socket};
-use crate::clock;
 use crate::trouble::Kind;
+use crate::{clock, limits};
 
 /// Orders kept for a component that has not greeted yet.
 const PENDING_MAX: usize = 16;
@@ -52,6 +54,8 @@ pub(super) struct Keeper {
     life: Life,
     configured: bool,
     pending: Vec<Order>,
+    /// Missed deadlines by connection, as they were told last.
+    late: BTreeMap<u16, u64>,
     /// When this task last ran, to know a stall of the agent from one of the component.
     turned_at: Instant,
 }
@@ -77,11 +81,12 @@ impl Keeper {
         mut messages: mpsc::Receiver<Message>,
     ) {
         let instance = order.instance;
-        let started = Process::start(&shared.config, &order);
+        let started = Process::start((&shared.config, &shared.limiter), &order);
         match started {
             Ok(process) => {
                 let mut keeper = Self::new(Rc::clone(&shared), order, process);
-                keeper.announce().await;
+                let pid = keeper.announce();
+                shared.tell(instance, InstanceNews::Started { pid }).await;
                 keeper.watch(&mut messages).await;
                 keeper.bury().await;
             }
@@ -91,6 +96,20 @@ impl Keeper {
                 shared.tell(instance, InstanceNews::LaunchFailed { reason }).await;
             }
         }
+    }
+
+    /// Goes on with a process that an agent before this one started.
+    pub(super) fn adopt(shared: Rc<Shared>, order: LaunchOrder, process: Process) -> Self {
+        let mut keeper = Self::new(shared, order, process);
+        keeper.life.adopted();
+        keeper.announce();
+        keeper
+    }
+
+    /// Stays with what was adopted until it is gone.
+    pub(super) async fn stay(mut self, mut messages: mpsc::Receiver<Message>) {
+        self.watch(&mut messages).await;
+        self.bury().await;
     }
 
     fn new(shared: Rc<Shared>, order: LaunchOrder, process: Process) -> Self {
@@ -104,22 +123,24 @@ impl Keeper {
             life,
             configured: false,
             pending: Vec::new(),
+            late: BTreeMap::new(),
             turned_at: now,
         }
     }
 
     /// The process runs: everybody who watches processes gets to know it.
-    async fn announce(&self) {
+    fn announce(&self) -> u32 {
         let (instance, component) = (self.order.instance, &self.order.component);
         let pid = self.process.id();
         if let Some(kept) = self.shared.kept.borrow_mut().get_mut(&instance) {
             kept.pid = pid;
+            kept.badge.clone_from(&self.process.keepsake.badge);
         }
-        let program = &self.process.executable;
-        self.shared.journal.add(component.to_string(), instance, pid, program);
+        let Process { executable, keepsake, .. } = &self.process;
+        self.shared.journal.add(instance, pid, executable, keepsake);
         self.shared.outlets.watch.add(instance, pid, component);
         tracing::debug!(event = "started", %component, instance, pid);
-        self.shared.tell(instance, InstanceNews::Started { pid }).await;
+        pid
     }
 
     /// Until the process ends.
@@ -162,10 +183,13 @@ impl Keeper {
             Command::Activate(token) => self.tell(Order::Activate { token }).await,
             Command::Deactivate => self.tell(Order::Deactivate).await,
             Command::Reset => self.tell(Order::Reset).await,
+            Command::Patience(limit) => self.life.be_patient(limit),
             Command::Finish => {
                 self.life.finish(now);
                 match self.link {
                     Some(_) => self.tell(Order::Finish).await,
+                    // It will greet in a moment, and be told then.
+                    None if self.life.is_returning() => {}
                     // Nobody is there to be asked.
                     None => self.terminate(now),
                 }
@@ -286,11 +310,25 @@ impl Keeper {
             FromComponent::Beat(_) => self.life.beat(clock::now()),
             FromComponent::Counters(counters) => {
                 samples::record(&counters, &self.order, &self.shared.outlets.record);
+                self.late(&counters.inputs).await;
             }
             FromComponent::Error(report) => {
                 let component = &self.order.component;
                 tracing::warn!(event = "component-says", %component, "{}", report.message);
                 self.life.answered(clock::now());
+            }
+        }
+    }
+
+    /// Tells the brain of deadlines that were missed since it was told last.
+    async fn late(&mut self, inputs: &[InputCounters]) {
+        let wired = |connection| self.order.inputs.iter().any(|one| one.connection == connection);
+        for input in inputs.iter().filter(|input| wired(input.connection)) {
+            let (connection, count) = (input.connection, input.late);
+            let told = self.late.insert(connection, count).unwrap_or(0);
+            if count != told {
+                let news = InstanceNews::Late { connection, count };
+                self.shared.tell(self.order.instance, news).await;
             }
         }
     }
@@ -339,13 +377,34 @@ impl Keeper {
 
     /// Reaps the process and says how it ended.
     async fn bury(mut self) {
-        let reason = self.process.reap();
+        let (end, reason) = self.process.reap().await;
+        let was_out_of_memory = self.was_out_of_memory(end, &reason);
+        if let Some(group) = &self.process.keepsake.cgroup {
+            limits::dissolve(group);
+        }
         let instance = self.order.instance;
         tracing::debug!(event = "ended", component = %self.order.component, instance, reason);
         self.shared.kept.borrow_mut().remove(&instance);
         self.shared.journal.remove(instance);
         self.shared.outlets.watch.remove(instance, &self.shared.outlets.record);
-        self.shared.tell(instance, InstanceNews::Exited { reason }).await;
+        let news = match was_out_of_memory {
+            true => InstanceNews::OutOfMemory { reason },
+            false => InstanceNews::Exited { reason },
+        };
+        self.shared.tell(instance, news).await;
+    }
+
+    /// Whether the kernel, or its limit, took the memory away that it wanted.
+    fn was_out_of_memory(&self, end: Option<End>, reason: &str) -> bool {
+        let group = self.process.keepsake.cgroup.as_deref();
+        let of_group = group.is_some_and(limits::was_out_of_memory);
+        // One that we ended ourselves says nothing.
+        let by_kernel =
+            end == Some(End::Signal(9)) && !self.life.is_ending() && self.shared.oom.is_fresh();
+        let refused = self.order.spec.limits.memory.is_some()
+            && end != Some(End::Status(0))
+            && limits::says_refused(reason);
+        of_group || by_kernel || refused
     }
 }
 

@@ -73,6 +73,7 @@ pub(super) async fn bound(shared: Weak<Shared>) {
     loop {
         tokio::time::sleep(LOOK_PERIOD).await;
         let Some(shared) = shared.upgrade() else { return };
+        shared.oom.look();
         if let Err(error) = shared.config.logs.bound() {
             let dir = shared.config.logs.dir.display();
             tracing::debug!(event = "logs-unbounded", %dir, %error);

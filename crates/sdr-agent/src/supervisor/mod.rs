@@ -9,12 +9,14 @@
 mod instance;
 mod journal;
 mod keeper;
+mod keepsake;
 mod launch;
-mod leftovers;
 mod logs;
+mod pidfd;
 mod process;
 mod samples;
 mod socket;
+mod survivors;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -27,11 +29,13 @@ use sdr_component::protocol::SharedMemory;
 use sdr_core::{
     effect::{Command, LaunchOrder},
     id::ComponentKey,
-    input::{Input, InstanceId, InstanceNews},
+    input::{Adoption, Input, InstanceId, InstanceNews},
+    spec::{ComponentSpec, OnAgentDeath},
 };
-use sdr_files::robot::OnAgentDeath;
+use sdr_files::robot::Cgroup;
 use tokio::sync::mpsc;
 
+use crate::limits::{Limiter, OomWatch};
 use crate::metrics::Watch;
 use crate::record::RecordSender;
 use crate::taps::PortTypes;
@@ -39,8 +43,9 @@ use crate::trouble::Trouble;
 use journal::Journal;
 use keeper::{Keeper, Message};
 pub(crate) use launch::{executables, find};
-pub(crate) use leftovers::end_leftovers;
 pub(crate) use logs::{LogFiles, lines_at_end};
+use process::Process;
+pub(crate) use survivors::{Survivor, find as find_survivors};
 
 /// Messages that may wait for one keeper.
 const MAILBOX_MAX: usize = 64;
@@ -58,14 +63,23 @@ pub(crate) struct SupervisorConfig {
     pub(crate) state: PathBuf,
     /// Output of components.
     pub(crate) logs: LogFiles,
-    /// Whether they go on without the agent.
+    /// Whether they go on without the agent, unless their system says otherwise.
     pub(crate) on_agent_death: OnAgentDeath,
     /// Files of the robot's devices.
     pub(crate) devices: BTreeMap<String, String>,
     /// Where samples lie.
     pub(crate) memory: SharedMemory,
+    /// Where limits are enforced.
+    pub(crate) cgroup: Cgroup,
     /// Bars of the watch.
     pub(crate) patience: Patience,
+}
+
+impl SupervisorConfig {
+    /// What becomes of a component when the agent dies.
+    fn on_agent_death_of(&self, spec: &ComponentSpec) -> OnAgentDeath {
+        spec.on_agent_death.unwrap_or(self.on_agent_death)
+    }
 }
 
 /// How long a component may take.
@@ -131,6 +145,8 @@ struct Shared {
     config: SupervisorConfig,
     outlets: Outlets,
     journal: Journal,
+    limiter: Limiter,
+    oom: OomWatch,
     kept: RefCell<BTreeMap<InstanceId, Kept>>,
 }
 
@@ -138,32 +154,72 @@ struct Shared {
 #[derive(Clone, Debug)]
 struct Kept {
     component: ComponentKey,
+    on_agent_death: OnAgentDeath,
     /// 0 until the process runs.
     pid: u32,
+    badge: String,
     mailbox: mpsc::Sender<Message>,
 }
 
 impl Supervisor {
-    /// Opens the components' socket.
-    pub(crate) fn start(config: SupervisorConfig, outlets: Outlets) -> io::Result<Self> {
+    /// Goes on with `survivors` and opens the components' socket. What it returns is to be
+    /// told to the brain before anything else.
+    pub(crate) fn start(
+        config: SupervisorConfig,
+        outlets: Outlets,
+        survivors: Vec<Survivor>,
+    ) -> io::Result<(Self, Vec<Input>)> {
         fs::create_dir_all(&config.logs.dir)?;
         let socket = config.socket.clone();
         let shared = Rc::new(Shared {
             journal: Journal::new(&config.state),
+            limiter: Limiter::open(&config.cgroup),
+            oom: OomWatch::new(),
             config,
             outlets,
             kept: RefCell::default(),
         });
-        socket::listen(&socket, Rc::clone(&shared))?;
-        tokio::task::spawn_local(logs::bound(Rc::downgrade(&shared)));
-        Ok(Self { shared })
+        let supervisor = Self { shared };
+        // Before they can greet: who is not known is sent away.
+        let adopted = survivors.into_iter().filter_map(|survivor| supervisor.adopt(survivor));
+        let adopted = adopted.collect();
+        socket::listen(&socket, Rc::clone(&supervisor.shared))?;
+        tokio::task::spawn_local(logs::bound(Rc::downgrade(&supervisor.shared)));
+        Ok((supervisor, adopted))
+    }
+
+    fn adopt(&self, survivor: Survivor) -> Option<Input> {
+        let component = survivor.order.component.clone();
+        let adopted = Process::adopt(survivor).map_err(|error| {
+            tracing::error!(event = "not-adopted", %component, %error, next = "it goes on unwatched");
+        });
+        let (order, process) = adopted.ok()?;
+        let instance = order.instance;
+        let adoption = Adoption {
+            pid: process.id(),
+            component,
+            spec: order.spec.clone(),
+            inputs: order.inputs.clone(),
+        };
+        let messages = self.enlist(&order);
+        let keeper = Keeper::adopt(Rc::clone(&self.shared), order, process);
+        tokio::task::spawn_local(keeper.stay(messages));
+        Some(Input::Instance { instance, news: InstanceNews::Adopted(Box::new(adoption)) })
+    }
+
+    /// Makes the mailbox of a keeper.
+    fn enlist(&self, order: &LaunchOrder) -> mpsc::Receiver<Message> {
+        let (mailbox, messages) = mpsc::channel(MAILBOX_MAX);
+        let component = order.component.clone();
+        let on_agent_death = self.shared.config.on_agent_death_of(&order.spec);
+        let kept = Kept { component, on_agent_death, pid: 0, badge: String::new(), mailbox };
+        self.shared.kept.borrow_mut().insert(order.instance, kept);
+        messages
     }
 
     /// Starts a process; what comes of it is instance news.
     pub(crate) fn launch(&self, order: LaunchOrder) {
-        let (mailbox, messages) = mpsc::channel(MAILBOX_MAX);
-        let kept = Kept { component: order.component.clone(), pid: 0, mailbox };
-        self.shared.kept.borrow_mut().insert(order.instance, kept);
+        let messages = self.enlist(&order);
         tokio::task::spawn_local(Keeper::keep(Rc::clone(&self.shared), order, messages));
     }
 
@@ -176,12 +232,11 @@ impl Supervisor {
         }
     }
 
-    /// Ends all components and the socket, or leaves them running when they are to be kept.
-    pub(crate) async fn stop(&self) {
-        if self.shared.config.on_agent_death == OnAgentDeath::Keep {
-            return;
-        }
+    /// Ends components, and the socket when none is left.
+    pub(crate) async fn stop(&self, whom: Whom) -> Left {
         let all: Vec<Kept> = self.shared.kept.borrow().values().cloned().collect();
+        let ends = |kept: &Kept| whom == Whom::All || kept.on_agent_death == OnAgentDeath::Stop;
+        let all: Vec<Kept> = all.into_iter().filter(ends).collect();
         for kept in &all {
             // A full mailbox belongs to a keeper that is being told to end already.
             let _ = kept.mailbox.try_send(Message::Command(Command::Finish));
@@ -194,9 +249,31 @@ impl Supervisor {
         if tokio::time::timeout(STOP_MAX, ended).await.is_err() {
             tracing::error!(event = "components-left", "some processes could not be ended");
         }
+        if !self.shared.journal.is_empty() {
+            return Left::Some;
+        }
         remove_if_there(&self.shared.config.socket);
         remove_if_there(self.shared.journal.path());
+        Left::Nothing
     }
+}
+
+/// Which components end with the agent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Whom {
+    /// All.
+    All,
+    /// Those that are not to be kept.
+    NotKept,
+}
+
+/// What runs on after the agent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Left {
+    /// No component.
+    Nothing,
+    /// Some components.
+    Some,
 }
 
 impl Shared {
@@ -216,4 +293,4 @@ fn remove_if_there(path: &std::path::Path) {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

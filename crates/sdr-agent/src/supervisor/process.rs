@@ -2,7 +2,8 @@
 
 use std::io;
 use std::path::PathBuf;
-use std::process::{Child, ExitStatus};
+use std::process::Child;
+use std::time::Duration;
 
 use rustix::fd::OwnedFd;
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process_group, pidfd_open};
@@ -10,33 +11,56 @@ use sdr_core::effect::LaunchOrder;
 use tokio::io::Interest;
 use tokio::io::unix::AsyncFd;
 
+use super::keepsake::Keepsake;
 use super::launch::{self, LaunchError, Launched};
+use super::pidfd::{self, End};
+use super::survivors::Survivor;
 use super::{SupervisorConfig, logs};
+use crate::limits::Limiter;
 
 /// Lines of output that stand in the reason of an end.
 const LAST_LINES: usize = 5;
 
-/// A child of the agent, leader of its own process group.
+/// The end of a process that another one reaped, on a kernel that does not tell.
+const UNKNOWN: &str = "ended; an agent before this one started it, so its exit status is unknown";
+/// How often the end of a process that is not our child is asked for ...
+const ASKS_MAX: u32 = 10;
+/// ... and how long its parent has between two times to reap it.
+const ASK_AGAIN_AFTER: Duration = Duration::from_millis(2);
+
+/// A process of a component, leader of its own group.
 #[derive(Debug)]
 pub(super) struct Process {
-    child: Child,
+    parent: Parent,
     pid: Pid,
     exit: AsyncFd<OwnedFd>,
     pub(super) executable: PathBuf,
-    log: PathBuf,
-    log_begin: u64,
+    pub(super) keepsake: Keepsake,
+}
+
+/// Who started it.
+#[derive(Debug)]
+enum Parent {
+    /// This agent; it reaps it.
+    Us(Child),
+    /// An agent before this one, or this one before it was upgraded.
+    Predecessor,
 }
 
 impl Process {
     /// Starts what `order` says; a process whose end could not be seen is not kept.
     pub(super) fn start(
-        config: &SupervisorConfig,
+        (config, limiter): (&SupervisorConfig, &Limiter),
         order: &LaunchOrder,
     ) -> Result<Self, LaunchError> {
-        let Launched { mut child, executable, log, log_begin } = launch::start(config, order)?;
+        let Launched { mut child, executable, place } = launch::start(config, limiter, order)?;
         let pid = Pid::from_child(&child);
-        match watch(pid) {
-            Ok(exit) => Ok(Self { child, pid, exit, executable, log, log_begin }),
+        let watched = pidfd_open(pid, PidfdFlags::empty()).map_err(io::Error::from).and_then(watch);
+        match watched {
+            Ok(exit) => {
+                let keepsake = Keepsake::new(order, place);
+                Ok(Self { parent: Parent::Us(child), pid, exit, executable, keepsake })
+            }
             Err(error) => {
                 child.kill().and_then(|()| child.wait()).map_err(LaunchError::Watch)?;
                 Err(LaunchError::Watch(error))
@@ -44,9 +68,16 @@ impl Process {
         }
     }
 
+    /// Goes on with one that outlived the agent before.
+    pub(super) fn adopt(survivor: Survivor) -> io::Result<(LaunchOrder, Self)> {
+        let Survivor { order, keepsake, held, executable } = survivor;
+        let (pid, exit) = (held.pid, watch(held.handle)?);
+        Ok((order, Self { parent: Parent::Predecessor, pid, exit, executable, keepsake }))
+    }
+
     /// Its number.
     pub(super) fn id(&self) -> u32 {
-        self.child.id()
+        self.pid.as_raw_nonzero().get().unsigned_abs()
     }
 
     /// Returns when it has ended; it is not reaped by that.
@@ -57,48 +88,71 @@ impl Process {
 
     /// To its whole group: a component's children end with it.
     pub(super) fn signal(&self, signal: Signal) {
-        match kill_process_group(self.pid, signal) {
-            Ok(()) | Err(rustix::io::Errno::SRCH) => {}
+        let done = match self.parent {
+            // Until it is reaped its number, and that of its group, are its own.
+            Parent::Us(_) => kill_process_group(self.pid, signal).map_err(io::Error::from),
+            Parent::Predecessor => pidfd::signal_group(self.exit.get_ref(), self.pid, signal),
+        };
+        match done {
+            Ok(()) => {}
+            Err(error) if error.raw_os_error() == Some(libc::ESRCH) => {}
             Err(error) => {
                 tracing::error!(event = "not-signalled", pid = ?self.pid, ?signal, %error);
             }
         }
     }
 
-    /// Ends what is left of its group, reaps it, and says how it ended.
-    pub(super) fn reap(&mut self) -> String {
-        // Before it is reaped: until then its number, and that of its group, are its own.
+    /// Ends what is left of its group, reaps it, and says how it ended: when that is known, and
+    /// in words, with its last output.
+    pub(super) async fn reap(&mut self) -> (Option<End>, String) {
         self.signal(Signal::KILL);
-        let how = match self.child.wait() {
-            Ok(status) => describe(status),
-            Err(error) => format!("ended, status unknown: {error}"),
+        let end = match &mut self.parent {
+            Parent::Us(child) => child.wait().ok().and_then(End::of),
+            Parent::Predecessor => self.end_by_others().await,
         };
-        match logs::lines_at_end(&self.log, self.log_begin, LAST_LINES) {
+        (end, self.with_last_words(end.map_or_else(|| UNKNOWN.into(), describe)))
+    }
+
+    fn with_last_words(&self, how: String) -> String {
+        match logs::lines_at_end(&self.keepsake.log, self.keepsake.log_begin, LAST_LINES) {
             Ok((lines, _)) if !lines.trim().is_empty() => {
                 format!("{how}; last output: {}", lines.trim().replace('\n', " | "))
             }
             Ok(_) | Err(_) => how,
         }
     }
+
+    /// Somebody else reaps it; the kernel tells us how it ended once that is done.
+    async fn end_by_others(&self) -> Option<End> {
+        for _ in 0..ASKS_MAX {
+            let end = pidfd::end(self.exit.get_ref());
+            if end.is_some() {
+                return end;
+            }
+            tokio::time::sleep(ASK_AGAIN_AFTER).await;
+        }
+        None
+    }
 }
 
 #[expect(unsafe_code, reason = "tokio cannot know that a descriptor stays the same; here it does")]
-fn watch(pid: Pid) -> io::Result<AsyncFd<OwnedFd>> {
-    let handle = pidfd_open(pid, PidfdFlags::empty())?;
+fn watch(handle: OwnedFd) -> io::Result<AsyncFd<OwnedFd>> {
     // SAFETY: an `OwnedFd` names one open descriptor as long as it lives, and it lives in the
     // `AsyncFd`, which takes it out of the reactor before it is closed.
     Ok(unsafe { AsyncFd::register_with_interest(handle, Interest::READABLE) }?)
 }
 
-fn describe(status: ExitStatus) -> String {
-    use std::os::unix::process::ExitStatusExt as _;
-    match (status.code(), status.signal()) {
-        (Some(code), _) => format!("exit status {code}"),
-        (None, Some(number)) => match signal_name(number) {
-            Some(name) => format!("killed by signal {number} ({name})"),
-            None => format!("killed by signal {number}"),
-        },
-        (None, None) => format!("{status}"),
+fn describe(end: End) -> String {
+    match end {
+        End::Status(code) => format!("exit status {code}"),
+        End::Signal(number) => killed_by(number),
+    }
+}
+
+fn killed_by(number: i32) -> String {
+    match signal_name(number) {
+        Some(name) => format!("killed by signal {number} ({name})"),
+        None => format!("killed by signal {number}"),
     }
 }
 
@@ -129,14 +183,12 @@ fn signal_name(number: i32) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use std::os::unix::process::ExitStatusExt as _;
-
     use super::*;
 
     #[test]
     fn an_end_by_a_signal_is_told_by_its_usual_name() {
-        assert_eq!(describe(ExitStatus::from_raw(9)), "killed by signal 9 (SIGKILL)");
-        assert_eq!(describe(ExitStatus::from_raw(34)), "killed by signal 34");
-        assert_eq!(describe(ExitStatus::from_raw(7 << 8)), "exit status 7");
+        assert_eq!(describe(End::Signal(9)), "killed by signal 9 (SIGKILL)");
+        assert_eq!(describe(End::Signal(34)), "killed by signal 34");
+        assert_eq!(describe(End::Status(7)), "exit status 7");
     }
 }

@@ -9,7 +9,7 @@ use std::{fs, os::unix::fs::PermissionsExt as _};
 
 use rustix::process::{Pid, getpgid, getuid};
 use sdr_component::protocol::{
-    ErrorReport, FromComponent, Hello, LineBuffer, LineError, PROTOCOL_VERSION, ToComponent,
+    ErrorReport, FromComponent, Hello, LineBuffer, LineError, Order, PROTOCOL_VERSION, ToComponent,
     encode_line,
 };
 use thiserror::Error;
@@ -45,6 +45,8 @@ enum Refused {
     Unknown { instance: u64, component: String },
     #[error("process {pid} of user {uid} is not the process of instance {instance}")]
     Stranger { pid: i32, uid: u32, instance: u64 },
+    #[error("process {pid} does not carry the badge of instance {instance}")]
+    Badge { pid: i32, instance: u64 },
     #[error("{0}")]
     Io(#[from] io::Error),
 }
@@ -52,10 +54,13 @@ enum Refused {
 /// Opens the socket at `path`, only for this user, and serves it.
 pub(super) fn listen(path: &Path, shared: Rc<Shared>) -> io::Result<()> {
     // Whoever listened here was this robot's former agent: two on one state are refused at
-    // the API's socket, which is opened first.
-    remove_if_there(path);
-    let listener = UnixListener::bind(path)?;
-    fs::set_permissions(path, fs::Permissions::from_mode(0o600))?;
+    // the API's socket, which is opened first. Components that outlived it watch the folder:
+    // what appears under the name takes connections already.
+    let unnamed = path.with_extension("new");
+    remove_if_there(&unnamed);
+    let listener = UnixListener::bind(&unnamed)?;
+    fs::set_permissions(&unnamed, fs::Permissions::from_mode(0o600))?;
+    fs::rename(&unnamed, path)?;
     tokio::task::spawn_local(serve(listener, shared));
     Ok(())
 }
@@ -107,8 +112,13 @@ async fn welcome(mut stream: UnixStream, shared: &Shared) {
                 | Refused::Version { .. }
                 | Refused::Unknown { .. }
                 | Refused::Stranger { .. }
+                | Refused::Badge { .. }
                 | Refused::Io(_) => Kind::ComponentHello,
             };
+            if matches!(refused, Refused::Unknown { .. }) {
+                // It outlived an agent whose journal is lost: nobody else can end it.
+                let _ = say(&mut stream, &ToComponent::Command(Order::Finish)).await;
+            }
             let message = format!("components' socket: {refused}");
             shared.outlets.trouble.count(kind, &message);
             // It may be gone already.
@@ -158,6 +168,9 @@ fn check(
         group.is_some_and(|group| u32::try_from(group.as_raw_nonzero().get()) == Ok(known.pid));
     if !ours || peer.uid() != getuid().as_raw() {
         return Err(Refused::Stranger { pid, uid: peer.uid(), instance: hello.instance });
+    }
+    if hello.badge.as_ref().is_some_and(|badge| *badge != known.badge) {
+        return Err(Refused::Badge { pid, instance: hello.instance });
     }
     Ok(known.mailbox.clone())
 }

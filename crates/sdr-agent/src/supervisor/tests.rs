@@ -1,5 +1,6 @@
 //! Real processes, a real socket. The component is this test binary, started again.
 
+mod adoption;
 mod component;
 mod hangs;
 
@@ -14,7 +15,8 @@ use sdr_core::{
     order::{Epoch, Token},
     recover::Cause,
     spec::{
-        ComponentSpec, Execution, Isolation, IsolationAction, Launch, Needs, Place, Standby, Value,
+        ComponentSpec, Execution, Isolation, IsolationAction, Launch, Limits, Needs, Place,
+        Standby, Value,
     },
 };
 use tempfile::TempDir;
@@ -31,6 +33,33 @@ fn key() -> ComponentKey {
     ComponentKey::new(&Name::new("mapping").unwrap(), &Name::new("lidar").unwrap())
 }
 
+fn config(dir: &TempDir) -> SupervisorConfig {
+    let own = env::current_exe().unwrap();
+    let patience = Patience {
+        hello: Duration::from_millis(600),
+        finish: Duration::from_millis(200),
+        terminate: Duration::from_millis(200),
+        order: Duration::from_millis(600),
+        beat_idle: Duration::from_secs(600),
+        ..Patience::default()
+    };
+    SupervisorConfig {
+        path: vec![dir.path().join("bin"), own.parent().unwrap().into()],
+        socket: dir.path().join("c.sock"),
+        state: dir.path().into(),
+        logs: LogFiles {
+            dir: dir.path().join("logs"),
+            each_bytes_max: 1 << 20,
+            bytes_max: 1 << 20,
+        },
+        on_agent_death: OnAgentDeath::Stop,
+        devices: BTreeMap::from([("wheels".into(), "/dev/wheels0".into())]),
+        memory: SharedMemory { prefix: "t_".into(), root: "/dev/shm/t/".into() },
+        cgroup: Cgroup::Off,
+        patience,
+    }
+}
+
 fn token(run: u32) -> Token {
     Token { epoch: Epoch::first(&robot()), run }
 }
@@ -39,6 +68,8 @@ fn token(run: u32) -> Token {
 struct Bench {
     dir: TempDir,
     supervisor: Supervisor,
+    /// What the brain would be told first.
+    adopted: Vec<Input>,
     inputs: mpsc::Receiver<Input>,
     events: Events,
     trouble: Trouble,
@@ -51,31 +82,19 @@ impl Bench {
 
     fn with(change: impl FnOnce(&mut Patience)) -> Self {
         let dir = tempfile::tempdir().unwrap();
-        let own = env::current_exe().unwrap();
-        let mut patience = Patience {
-            hello: Duration::from_millis(600),
-            finish: Duration::from_millis(200),
-            terminate: Duration::from_millis(200),
-            order: Duration::from_millis(600),
-            beat_idle: Duration::from_secs(600),
-            ..Patience::default()
-        };
-        change(&mut patience);
-        let config = SupervisorConfig {
-            path: vec![dir.path().join("bin"), own.parent().unwrap().into()],
-            socket: dir.path().join("c.sock"),
-            state: dir.path().into(),
-            logs: LogFiles {
-                dir: dir.path().join("logs"),
-                each_bytes_max: 1 << 20,
-                bytes_max: 1 << 20,
-            },
-            on_agent_death: OnAgentDeath::Stop,
-            devices: BTreeMap::from([("wheels".into(), "/dev/wheels0".into())]),
-            memory: SharedMemory { prefix: "t_".into(), root: "/dev/shm/t/".into() },
-            patience,
-        };
         fs::create_dir(dir.path().join("bin")).unwrap();
+        let mut config = config(&dir);
+        change(&mut config.patience);
+        Self::open(dir, config)
+    }
+
+    /// What an agent finds that starts where another one died.
+    fn again(dir: TempDir) -> Self {
+        let config = config(&dir);
+        Self::open(dir, config)
+    }
+
+    fn open(dir: TempDir, config: SupervisorConfig) -> Self {
         let events = Events::new(robot());
         let trouble = Trouble::new(events.clone());
         let (sender, inputs) = mpsc::channel(256);
@@ -86,8 +105,9 @@ impl Bench {
             trouble: trouble.clone(),
             types: PortTypes::default(),
         };
-        let supervisor = Supervisor::start(config, outlets).unwrap();
-        Self { dir, supervisor, inputs, events, trouble }
+        let survivors = find_survivors(&config, &events);
+        let (supervisor, adopted) = Supervisor::start(config, outlets, survivors).unwrap();
+        Self { dir, supervisor, adopted, inputs, events, trouble }
     }
 
     /// A shell script as an executable.
@@ -108,7 +128,9 @@ impl Bench {
         let name = own.file_name().unwrap().to_str().unwrap();
         let role = "supervisor::tests::component::the_component_of_these_tests";
         let arguments = ["--exact", role, "--nocapture"].map(String::from).to_vec();
-        self.supervisor.launch(order(instance, name, arguments, manner));
+        let mut order = order(instance, name, arguments, manner);
+        order.spec.on_agent_death = (manner == "loyal").then_some(OnAgentDeath::Keep);
+        self.supervisor.launch(order);
     }
 
     /// The next news of `instance`.
@@ -135,13 +157,12 @@ impl Bench {
 
     async fn until_hung(&mut self, instance: InstanceId) -> String {
         loop {
-            match self.news(instance).await {
-                InstanceNews::Hung { reason } => return reason,
-                news @ InstanceNews::Exited { .. } => panic!("{news:?}"),
-                InstanceNews::Started { .. }
-                | InstanceNews::LaunchFailed { .. }
-                | InstanceNews::State { .. }
-                | InstanceNews::Heard { .. } => {}
+            let news = self.news(instance).await;
+            let ended =
+                matches!(news, InstanceNews::Exited { .. } | InstanceNews::OutOfMemory { .. });
+            assert!(!ended, "{news:?}");
+            if let InstanceNews::Hung { reason } = news {
+                return reason;
             }
         }
     }
@@ -155,7 +176,7 @@ impl Bench {
     }
 }
 
-fn order(
+pub(crate) fn order(
     instance: InstanceId,
     executable: &str,
     arguments: Vec<String>,
@@ -174,6 +195,8 @@ fn order(
         on_isolation: Isolation { action: IsolationAction::Continue, after: Duration::ZERO },
         standby: Standby::default(),
         parameters: vec![("manner".into(), Value::Text(manner.into()))],
+        on_agent_death: None,
+        limits: Limits::default(),
     };
     LaunchOrder { instance, component: key(), spec, inputs: Vec::new(), output_depth: 8 }
 }
@@ -361,40 +384,11 @@ fn stopping_ends_all_components_deaf_ones_too() {
             journal::read(bench.dir.path()).iter().map(|entry| entry.pid).collect();
         assert_eq!(pids.len(), 2);
 
-        bench.supervisor.stop().await;
+        bench.supervisor.stop(Whom::All).await;
 
         for pid in pids {
             assert_eq!(journal::start_time(pid), None);
         }
         assert!(!bench.dir.path().join("c.sock").exists());
-    });
-}
-
-#[test]
-fn leftovers_of_a_killed_agent_are_ended_and_others_are_not() {
-    run(async {
-        let mut bench = Bench::new();
-        bench.script("sleeper", "while true; do sleep 1000; done");
-        bench.launch(1, "sleeper");
-        assert!(matches!(bench.news(1).await, InstanceNews::Started { .. }));
-        // As if an agent had died: its journal, and a process that was given an old number.
-        let predecessor = tempfile::tempdir().unwrap();
-        let mut bystander = std::process::Command::new("sleep").arg("1000").spawn().unwrap();
-        let mut entries = journal::read(bench.dir.path());
-        let mut other = entries[0].clone();
-        other.pid = bystander.id();
-        entries.push(other);
-        fs::write(predecessor.path().join("processes.json"), serde_json::to_vec(&entries).unwrap())
-            .unwrap();
-
-        end_leftovers(predecessor.path(), &bench.events);
-
-        assert!(bench.until_exit(1).await.contains("signal 15"));
-        let said = bench.events.since(0);
-        assert_eq!(said.len(), 1);
-        assert_eq!(said[0].event.kind, "leftover-ended");
-        assert!(bystander.try_wait().unwrap().is_none());
-        bystander.kill().unwrap();
-        bystander.wait().unwrap();
     });
 }

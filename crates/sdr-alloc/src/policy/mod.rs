@@ -230,9 +230,9 @@ impl Default for Policy {
                 ..Bars::none()
             },
             relaxed: Some(Bars {
-                cpu_used_at_most: Some(Permille(950)),
+                cpu_used_at_most: Some(Permille(900)),
                 memory_free_at_least: Some(Bytes::mega(150)),
-                battery_at_least: Some(BatteryBar::new(Permille(150))),
+                battery_at_least: Some(BatteryBar::new(Permille(200))),
                 ..Bars::none()
             }),
             unknown: Unknown {

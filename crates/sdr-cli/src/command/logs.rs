@@ -30,12 +30,13 @@ pub(crate) struct LogsArgs {
 
 /// A component by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Which {
-    system: Option<Name>,
-    component: Name,
+pub(super) struct Which {
+    pub(super) system: Option<Name>,
+    pub(super) component: Name,
 }
 
-fn parse(text: &str) -> Result<Which, String> {
+/// `COMPONENT` or `SYSTEM/COMPONENT`.
+pub(super) fn parse(text: &str) -> Result<Which, String> {
     let name = |word: &str| Name::new(word).map_err(|error| error.to_string());
     match text.split_once('/') {
         Some((system, component)) => {
@@ -64,7 +65,7 @@ pub(crate) async fn run(args: LogsArgs, session: &Session) -> Result<ExitCode, F
 }
 
 /// The one system that has this component.
-fn system_of(view: &StatusView, component: &Name) -> Result<String, Failure> {
+pub(super) fn system_of(view: &StatusView, component: &Name) -> Result<String, Failure> {
     let has = |name: &str| name == component.as_str();
     let systems: Vec<&str> = (view.systems.iter())
         .filter(|system| system.components.iter().any(|component| has(&component.name)))

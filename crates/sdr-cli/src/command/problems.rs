@@ -46,7 +46,7 @@ struct Refusal {
 }
 
 /// Says what is wrong with a file that was to be sent; `outcome` is what became of it.
-pub(super) fn tell(problems: &Problems, outcome: &str, session: &Session) -> Result<(), Failure> {
+pub(crate) fn tell(problems: &Problems, outcome: &str, session: &Session) -> Result<(), Failure> {
     let problems = problems.as_slice();
     for problem in problems {
         session.output.note(&problem.to_string())?;

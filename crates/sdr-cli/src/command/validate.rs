@@ -45,6 +45,7 @@ enum Kind {
     Allocation,
     Recovery,
     Role,
+    Scenario,
 }
 
 impl Kind {
@@ -55,6 +56,7 @@ impl Kind {
             Self::Allocation => "allocation policy",
             Self::Recovery => "recovery policy",
             Self::Role => "role policy",
+            Self::Scenario => "scenario",
         }
     }
 }
@@ -83,6 +85,7 @@ pub(crate) async fn run(args: ValidateArgs, session: &Session) -> Result<ExitCod
             Kind::Allocation => (sdr_files::load_allocation(file).err(), Vec::new()),
             Kind::Recovery => (sdr_files::load_recovery(file).err(), Vec::new()),
             Kind::Role => (sdr_files::load_role(file).err(), Vec::new()),
+            Kind::Scenario => (sdr_files::load_scenario(file).err(), Vec::new()),
         };
         reports.push(report(file, kind, found.as_ref(), unchecked));
     }
@@ -141,7 +144,9 @@ fn kind_of(file: &Path) -> Kind {
     let has = |key: &str| {
         text.lines().any(|line| line.strip_prefix(key).is_some_and(|rest| rest.starts_with(':')))
     };
-    if has("system") || has("components") {
+    if has("scenario") || has("timeline") {
+        Kind::Scenario
+    } else if has("system") || has("components") {
         Kind::System
     } else if has("rules") || has("ladders") || has("recovery") {
         Kind::Recovery

@@ -29,7 +29,13 @@ use std::{
 use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
-use self::{out::Out, pictures::Folder as PictureFolder};
+pub(crate) use self::{
+    fleet::{Folder, quoted},
+    out::Out,
+    story::is_up,
+};
+
+use self::pictures::Folder as PictureFolder;
 use crate::{Session, failure::Failure};
 
 /// The robots of the demo, in the order of the paper.
@@ -75,7 +81,7 @@ impl DemoArgs {
         };
         let (coordinator, ballast) = (self.coordinator, !self.no_ballast);
         need::check(ballast)?;
-        let out = Out::new(self.out, Path::new("."))?;
+        let out = Out::new(self.out, Path::new("."), "sdr-demo")?;
         Ok(Plan { out, coordinator, ballast, images, keep: self.keep, up: Cell::new(false) })
     }
 }
@@ -96,7 +102,7 @@ pub(crate) async fn run(args: DemoArgs, session: &Session) -> Result<ExitCode, F
 }
 
 /// Waits for whatever asks us to stop, and says what it was.
-fn stop_signal() -> Result<impl Future<Output = &'static str>, Failure> {
+pub(crate) fn stop_signal() -> Result<impl Future<Output = &'static str>, Failure> {
     let listen = |kind| {
         signal(kind).map_err(|error| Failure::new(format!("cannot listen to signals: {error}")))
     };

@@ -13,18 +13,18 @@ const FOLDERS_MAX: u32 = 10_000;
 
 /// A folder that can be written to. When nothing was written, one that was made here goes again.
 #[derive(Debug)]
-pub(super) struct Out {
+pub(crate) struct Out {
     path: PathBuf,
     /// Those made here, the outermost first.
     made: Vec<PathBuf>,
 }
 
 impl Out {
-    /// `wanted`, else the first free `sdr-demo-N` below `parent`.
-    pub(super) fn new(wanted: Option<PathBuf>, parent: &Path) -> Result<Self, Failure> {
+    /// `wanted`, else the first free `STEM-N` below `parent`.
+    pub(crate) fn new(wanted: Option<PathBuf>, parent: &Path, stem: &str) -> Result<Self, Failure> {
         let path = match wanted {
             Some(path) => path,
-            None => free(parent)?,
+            None => free(parent, stem)?,
         };
         let missing = path.ancestors().take_while(|one| !is_there(one)).map(Path::to_path_buf);
         let made = missing.collect::<Vec<_>>().into_iter().rev().collect();
@@ -39,7 +39,7 @@ impl Out {
     }
 
     /// Where it is.
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
@@ -66,9 +66,9 @@ fn is_there(path: &Path) -> bool {
     path.as_os_str().is_empty() || path.exists()
 }
 
-/// The first `sdr-demo-N` that is not there yet.
-fn free(parent: &Path) -> Result<PathBuf, Failure> {
-    let folders = (1..=FOLDERS_MAX).map(|number| parent.join(format!("sdr-demo-{number}")));
+/// The first `STEM-N` that is not there yet.
+fn free(parent: &Path, stem: &str) -> Result<PathBuf, Failure> {
+    let folders = (1..=FOLDERS_MAX).map(|number| parent.join(format!("{stem}-{number}")));
     let free = folders.into_iter().find(|folder| !folder.exists());
     free.ok_or_else(|| {
         Failure::Usage(format!("{FOLDERS_MAX} reports are here already; give --out DIR"))
@@ -82,9 +82,9 @@ mod tests {
     #[test]
     fn reports_are_numbered_and_none_is_overwritten() {
         let parent = tempfile::tempdir().unwrap();
-        let first = Out::new(None, parent.path()).unwrap();
+        let first = Out::new(None, parent.path(), "sdr-demo").unwrap();
         assert!(first.path().ends_with("sdr-demo-1"));
-        let second = Out::new(None, parent.path()).unwrap();
+        let second = Out::new(None, parent.path(), "sdr-demo").unwrap();
         assert!(second.path().ends_with("sdr-demo-2"));
     }
 
@@ -94,7 +94,7 @@ mod tests {
         let file = parent.path().join("file");
         fs::write(&file, "x").unwrap();
         for wrong in [PathBuf::from("/proc/nope"), file.join("below"), file] {
-            match Out::new(Some(wrong.clone()), parent.path()) {
+            match Out::new(Some(wrong.clone()), parent.path(), "sdr-demo") {
                 Err(Failure::Failed(answer)) => {
                     assert!(answer.error.contains(&wrong.display().to_string()), "{answer:?}");
                 }
@@ -107,17 +107,17 @@ mod tests {
     fn folders_made_for_a_report_that_never_came_go_and_others_stay() {
         let parent = tempfile::tempdir().unwrap();
         let deep = parent.path().join("a/b");
-        drop(Out::new(Some(deep.clone()), parent.path()).unwrap());
+        drop(Out::new(Some(deep.clone()), parent.path(), "x").unwrap());
         assert!(parent.path().exists() && !parent.path().join("a").exists());
 
-        let out = Out::new(Some(deep.clone()), parent.path()).unwrap();
+        let out = Out::new(Some(deep.clone()), parent.path(), "x").unwrap();
         fs::write(out.path().join("report.json"), "{}").unwrap();
         drop(out);
         assert!(deep.join("report.json").exists());
 
         let there = parent.path().join("there");
         fs::create_dir(&there).unwrap();
-        drop(Out::new(Some(there.clone()), parent.path()).unwrap());
+        drop(Out::new(Some(there.clone()), parent.path(), "x").unwrap());
         assert!(there.exists());
     }
 }

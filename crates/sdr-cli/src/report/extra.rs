@@ -8,6 +8,7 @@ use std::{fs, path::Path};
 use serde::{Deserialize, Serialize};
 
 use super::machine::Machine;
+use crate::lab::{Told, Verdict};
 
 /// Name of the file beside the recordings.
 pub(crate) const FILE: &str = "demo.json";
@@ -46,6 +47,24 @@ pub(crate) struct Extra {
     pub(crate) pictures: Option<String>,
     /// The topic of the detector's verdicts.
     pub(crate) danger_topic: Option<String>,
+    /// What a scenario of the lab was, and what came of it.
+    pub(crate) lab: Option<Lab>,
+}
+
+/// A scenario of the lab.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Lab {
+    /// Its name.
+    pub(crate) scenario: String,
+    /// What it says of itself.
+    pub(crate) about: String,
+    /// What drew its radio.
+    pub(crate) seed: u64,
+    /// What was done, and when.
+    pub(crate) timeline: Vec<Told>,
+    /// What was expected, and what was found.
+    pub(crate) expectations: Vec<Verdict>,
 }
 
 /// How the radio was played.

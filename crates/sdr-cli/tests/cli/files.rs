@@ -204,3 +204,24 @@ fn a_wait_that_is_over_says_what_is_awaited_and_why() {
         assert!(run.stderr.contains(line), "{line}: {}", run.stderr);
     }
 }
+
+#[test]
+fn a_policy_is_explained_in_words_and_a_bad_one_refused_with_its_place() {
+    let built_in = sdr(&["policy", "explain"]);
+    assert_eq!(built_in.code, Some(0), "{}", built_in.stderr);
+    assert!(built_in.stdout.contains("battery-low: charge of the robot is at most 15 % for 10 s"));
+
+    let mine = "recovery: mine\nextends: default\nrules:\n  - { cause: odd, when: robot.cpu > 0.5, \
+                ladder: elsewhere }\n";
+    let (_folder, file) = folder("mine.yaml", mine);
+    let rules = &sdr(&["policy", "explain", &file, "-o", "json"]).json()["rules"];
+    let odd = rules.as_array().unwrap().iter().find(|rule| rule["cause"] == "odd").unwrap();
+    assert_eq!(odd["when"], "`robot.cpu > 0.5` is true");
+    assert_eq!(odd["over"], "when that is not so");
+
+    let (_folder, file) = folder("bad.yaml", &mine.replace("robot.cpu", "robot.cup"));
+    let bad = sdr(&["policy", "explain", &file]);
+    assert_eq!(bad.code, Some(1));
+    let told = format!("{}{}", bad.stdout, bad.stderr);
+    assert!(told.contains("unknown fact `robot.cup`"), "{told}");
+}

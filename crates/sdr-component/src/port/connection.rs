@@ -61,7 +61,7 @@ impl Connection {
     pub(crate) fn discard(&mut self) {
         self.subscriber.clear_wakes();
         while let Ok(Some(_)) = self.subscriber.receive() {}
-        self.statistics.resume();
+        self.statistics.pause();
     }
 
     fn judge(&mut self, header: &SampleHeader) -> Passage {

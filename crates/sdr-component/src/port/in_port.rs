@@ -138,6 +138,9 @@ impl InputCore {
     pub(crate) fn stop_listening(&mut self) {
         self.is_listening = false;
         self.queue.clear();
+        for connection in &mut self.connections {
+            connection.statistics.pause();
+        }
     }
 
     /// Takes in what came; returns how many samples were accepted.

@@ -26,6 +26,22 @@ impl<M: Message> OutPort<M> {
         Self { core, message: PhantomData }
     }
 
+    /// The same, and `message` is the last sample whenever the component leaves the active
+    /// state: deactivated, aborted or finished. What a reader does when the process is killed
+    /// is the reader's matter: its connection's deadline.
+    pub fn with_safe(self, message: &M::View<'_>) -> Result<Self, PortError> {
+        let mut core = self.core.lock();
+        let mut bytes = vec![0; message.encoded_len()];
+        message.encode(&mut bytes).map_err(|source| PortError::Message {
+            port: core.name.to_string(),
+            message_type: M::TYPE,
+            source,
+        })?;
+        core.safe = Some(Safe { bytes, message_type: M::TYPE });
+        drop(core);
+        Ok(self)
+    }
+
     /// Encodes the message straight into shared memory, stamps it, and wakes the readers.
     pub fn send(&self, message: &M::View<'_>) -> Result<(), PortError> {
         self.send_with(message.encoded_len(), |out| message.encode(out))
@@ -72,6 +88,13 @@ impl SharedOutput {
     }
 }
 
+/// The last sample of an activation, encoded.
+#[derive(Debug)]
+struct Safe {
+    bytes: Vec<u8>,
+    message_type: &'static str,
+}
+
 /// An output without its type.
 #[derive(Debug)]
 pub(crate) struct OutputCore {
@@ -80,18 +103,37 @@ pub(crate) struct OutputCore {
     publisher: Option<Publisher>,
     /// Stamped on the next sample; absent while the component is not active.
     stamp: Option<SampleHeader>,
+    /// Sent before the port falls silent.
+    safe: Option<Safe>,
     sent: u64,
     sent_bytes: u64,
 }
 
 impl OutputCore {
     pub(crate) fn new(name: Name, publisher: Option<Publisher>) -> Self {
-        Self { name, publisher, stamp: None, sent: 0, sent_bytes: 0 }
+        Self { name, publisher, stamp: None, safe: None, sent: 0, sent_bytes: 0 }
     }
 
     /// Samples carry this token from now on, counted from 1; `None` keeps the port silent.
     pub(crate) fn set_token(&mut self, token: Option<&Token>) {
         self.stamp = token.map(SampleHeader::new);
+    }
+
+    /// Sends the safe value, when there is one, and writes nothing from then on.
+    pub(crate) fn fall_silent(&mut self) -> Result<(), PortError> {
+        let mut sent = Ok(());
+        if self.stamp.is_some()
+            && let Some(safe) = self.safe.take()
+        {
+            let fill = |out: &mut [u8]| {
+                out.copy_from_slice(&safe.bytes);
+                Ok(())
+            };
+            sent = self.send(safe.bytes.len(), safe.message_type, fill);
+            self.safe = Some(safe);
+        }
+        self.set_token(None);
+        sent
     }
 
     /// Samples carry this tick from now on.

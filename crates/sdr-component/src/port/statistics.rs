@@ -10,6 +10,11 @@ const PERIODS: usize = 64;
 pub struct Statistics {
     counters: InputCounters,
     deadline_ns: Option<u64>,
+    /// Since when the next sample is waited for; `None` before the first one, and while
+    /// nobody listens.
+    waits_since_ns: Option<u64>,
+    /// Deadlines counted as missed since then.
+    missed: u64,
     sequence: Option<u64>,
     periods: [u64; PERIODS],
     periods_count: usize,
@@ -31,13 +36,23 @@ impl Statistics {
             period_median_ns: 0,
             epoch: 0,
         };
-        Self { counters, deadline_ns, sequence: None, periods: [0; PERIODS], periods_count: 0 }
+        Self {
+            counters,
+            deadline_ns: deadline_ns.filter(|deadline| *deadline > 0),
+            waits_since_ns: None,
+            missed: 0,
+            sequence: None,
+            periods: [0; PERIODS],
+            periods_count: 0,
+        }
     }
 
     /// A sample was accepted. `sequence` continues the one before unless the token is new.
     ///
     /// A sequence that goes back (a bridge that began anew) is no loss.
     pub fn accept(&mut self, now_ns: u64, epoch: u64, sequence: u64, token_is_new: bool) {
+        self.count_missed(now_ns);
+        (self.waits_since_ns, self.missed) = (Some(now_ns), 0);
         let counters = &mut self.counters;
         if let Some(before) = self.sequence
             && !token_is_new
@@ -50,9 +65,6 @@ impl Statistics {
         } else {
             let period = now_ns.saturating_sub(counters.last_ns);
             counters.gap_max_ns = counters.gap_max_ns.max(period);
-            if self.deadline_ns.is_some_and(|deadline| period > deadline) {
-                counters.late += 1;
-            }
             self.periods[self.periods_count % PERIODS] = period;
             self.periods_count += 1;
         }
@@ -72,17 +84,27 @@ impl Statistics {
         self.counters.broken += 1;
     }
 
-    /// What comes next does not continue what came last: nobody listened in between.
-    pub fn resume(&mut self) {
+    /// What comes next does not continue what came last: nobody listens in between.
+    pub fn pause(&mut self) {
         self.sequence = None;
+        self.waits_since_ns = None;
     }
 
     /// The figures; the longest gap starts anew with this call.
-    pub fn take(&mut self) -> InputCounters {
+    pub fn take(&mut self, now_ns: u64) -> InputCounters {
+        self.count_missed(now_ns);
         let mut counters = self.counters.clone();
         counters.period_median_ns = self.median();
         self.counters.gap_max_ns = 0;
         counters
+    }
+
+    /// Each deadline that passes without a sample counts, also while none comes at all.
+    fn count_missed(&mut self, now_ns: u64) {
+        let (Some(deadline), Some(since)) = (self.deadline_ns, self.waits_since_ns) else { return };
+        let missed = now_ns.saturating_sub(since).saturating_sub(1) / deadline;
+        self.counters.late += missed.saturating_sub(self.missed);
+        self.missed = self.missed.max(missed);
     }
 
     fn median(&self) -> u64 {
@@ -110,7 +132,7 @@ mod tests {
         {
             statistics.accept(1, 1, sequence, token_is_new);
         }
-        assert_eq!(statistics.take().lost, 2);
+        assert_eq!(statistics.take(1).lost, 2);
     }
 
     #[test]
@@ -120,10 +142,27 @@ mod tests {
             statistics.accept(now, 1, now, false);
         }
 
-        let window = statistics.take();
+        let window = statistics.take(150);
         assert_eq!((window.first_ns, window.last_ns), (100, 150));
         assert_eq!((window.gap_max_ns, window.period_median_ns, window.late), (30, 10, 1));
-        assert_eq!(statistics.take().gap_max_ns, 0);
+        assert_eq!(statistics.take(150).gap_max_ns, 0);
+    }
+
+    #[test]
+    fn deadlines_are_missed_one_by_one_while_nothing_comes_and_somebody_listens() {
+        let mut statistics = Statistics::new(0, Some(10));
+        assert_eq!(statistics.take(1000).late, 0);
+        statistics.accept(1000, 1, 1, true);
+        for (now, late) in [(1010, 0), (1011, 1), (1025, 2), (1031, 3)] {
+            assert_eq!(statistics.take(now).late, late, "at {now}");
+        }
+
+        statistics.accept(1035, 1, 2, false);
+        assert_eq!(statistics.take(1040).late, 3);
+
+        statistics.pause();
+        statistics.accept(9000, 1, 3, false);
+        assert_eq!(statistics.take(9005).late, 3);
     }
 
     #[test]
@@ -134,7 +173,7 @@ mod tests {
             now += period;
             statistics.accept(now, 1, 0, false);
         }
-        assert_eq!(statistics.take().period_median_ns, 7);
+        assert_eq!(statistics.take(now).period_median_ns, 7);
     }
 
     proptest! {
@@ -148,7 +187,7 @@ mod tests {
             for sequence in &arrived {
                 statistics.accept(1, 1, *sequence, false);
             }
-            let counters = statistics.take();
+            let counters = statistics.take(1);
             if let (Some(first), Some(last)) = (arrived.first(), arrived.last()) {
                 prop_assert_eq!(counters.accepted + counters.lost, last - first + 1);
             }

@@ -80,7 +80,7 @@ fn after_the_first_sample_of_a_new_home_the_old_one_is_refused_and_counted() {
     let mut core = shared.lock();
     let tokens: Vec<Token> = core.heard.drain(..).map(|heard| heard.token).collect();
     assert_eq!(tokens, [token(1, 7), token(2, 1)]);
-    let counters = core.connections[0].statistics.take();
+    let counters = core.connections[0].statistics.take(0);
     assert_eq!((counters.accepted, counters.fenced, counters.lost, counters.epoch), (2, 1, 0, 2));
 }
 
@@ -98,7 +98,7 @@ fn a_reader_that_falls_behind_keeps_the_newest() {
     }
 
     assert_eq!(all(&mut input), [8, 9, 10]);
-    assert_eq!(core.lock().connections[0].statistics.take().lost, 0);
+    assert_eq!(core.lock().connections[0].statistics.take(0).lost, 0);
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn what_is_no_message_is_counted_and_dropped() {
     publisher.loan(4).unwrap().send(nameless).unwrap();
 
     assert!(input.receive().is_none());
-    assert_eq!(core.lock().connections[0].statistics.take().broken, 2);
+    assert_eq!(core.lock().connections[0].statistics.take(0).broken, 2);
 }
 
 #[test]

@@ -48,6 +48,12 @@ pub const ENV_INSTANCE: &str = "SDR_INSTANCE";
 /// Environment: how long to go on without an agent, milliseconds; `0` ends at once, absent
 /// means for ever.
 pub const ENV_ORPHAN_MS: &str = "SDR_ORPHAN_MS";
+/// Environment: a secret word by which a later agent knows the process again.
+pub const ENV_BADGE: &str = "SDR_BADGE";
+/// Environment: how long to stay active without an agent, milliseconds; absent means for ever.
+pub const ENV_LEASE_MS: &str = "SDR_LEASE_MS";
+/// Environment: set when the process is to lock its memory.
+pub const ENV_LOCK_MEMORY: &str = "SDR_LOCK_MEMORY";
 
 /// The parameter that every component built with this crate has: bytes to hold and touch
 /// from `on_initialize` to the end. A test aid: the paper's components "allocate a 500MB
@@ -107,6 +113,9 @@ pub struct Hello {
     pub instance: InstanceId,
     /// Its process.
     pub pid: u32,
+    /// The word of [`ENV_BADGE`]; a component that does not know it may leave it out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub badge: Option<String>,
     /// Ports and parameters.
     pub profile: ComponentProfile,
     /// Present state: `created` in a fresh process, otherwise what outlived the last agent.
@@ -183,7 +192,7 @@ pub struct InputCounters {
     pub lost: u64,
     /// Samples refused because of an old token so far.
     pub fenced: u64,
-    /// Samples later than the deadline so far.
+    /// Deadlines that passed without a sample while it was active, so far.
     pub late: u64,
     /// Samples that were no message of the port's type so far.
     #[serde(default)]

@@ -89,6 +89,7 @@ fn every_word_of_a_component_survives_the_wire() {
         component: key(),
         instance: 7,
         pid: 4711,
+        badge: None,
         profile,
         now: now.clone(),
     };

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use sdr_core::spec::ComponentProfile;
 
-use super::{identity::Identity, outbox::Outbox, wake::Wake};
+use super::{door::Door, identity::Identity, outbox::Outbox, wake::Wake};
 use crate::protocol::{
     ErrorReport, FromComponent, Hello, LineBuffer, PROTOCOL_VERSION, RECONNECT_PERIOD, ToComponent,
     encode_line,
@@ -34,6 +34,8 @@ pub(super) enum News {
     Connected,
     /// It said something.
     Said(ToComponent),
+    /// No agent for longer than it may act alone.
+    Alone,
     /// No agent for too long.
     Orphaned,
     /// The component itself wishes to end.
@@ -112,8 +114,10 @@ enum End {
 
 impl Worker {
     fn run(self) {
+        let door = Door::watch(&self.identity.socket);
         let mut alone_since = Instant::now();
         let mut met = false;
+        let mut lease = None;
         loop {
             if let Ok(stream) = UnixStream::connect(&self.identity.socket) {
                 met = true;
@@ -123,22 +127,34 @@ impl Worker {
                     return;
                 }
                 alone_since = Instant::now();
+                lease = self.identity.lease;
             }
             let limit = if met { self.identity.orphan } else { Some(FIRST_AGENT_WITHIN) };
             if limit.is_some_and(|limit| alone_since.elapsed() >= limit) {
                 return self.give_up(met);
             }
-            if self.pause(RECONNECT_PERIOD.min(limit.unwrap_or(RECONNECT_PERIOD))) {
+            let alone = alone_since.elapsed();
+            if lease.take_if(|lease| alone >= *lease).is_some() {
+                let _ = self.news.try_send(News::Alone);
+                self.wake.ring();
+            }
+            let ends = limit.into_iter().chain(lease).map(|end| end.saturating_sub(alone));
+            let wait = ends.chain([RECONNECT_PERIOD]).min().unwrap_or(RECONNECT_PERIOD);
+            if self.pause(wait, door.as_ref()) {
                 return;
             }
         }
     }
 
-    /// Waits; true when the execution thread ended meanwhile.
-    fn pause(&self, wait: Duration) -> bool {
+    /// Waits, until an agent opens its door at the latest; true when the execution thread ended
+    /// meanwhile.
+    fn pause(&self, wait: Duration, door: Option<&Door>) -> bool {
         self.outbox_wake.clear();
         let limit = Timespec::try_from(wait).ok();
-        let _ = poll(&mut [PollFd::new(&self.outbox_wake, PollFlags::IN)], limit.as_ref());
+        let mut fds = vec![PollFd::new(&self.outbox_wake, PollFlags::IN)];
+        fds.extend(door.map(|door| PollFd::new(door, PollFlags::IN)));
+        let _ = poll(&mut fds, limit.as_ref());
+        door.into_iter().for_each(Door::clear);
         self.outbox.is_closed()
     }
 
@@ -149,7 +165,7 @@ impl Worker {
         let start = Instant::now();
         let _ = self.news.try_send(News::Orphaned);
         self.wake.ring();
-        while !self.pause(Duration::from_millis(100)) {
+        while !self.pause(Duration::from_millis(100), None) {
             if start.elapsed() > ORPHAN_GRACE {
                 std::process::exit(1);
             }
@@ -163,6 +179,7 @@ impl Worker {
             component: self.identity.component.clone(),
             instance: self.identity.instance,
             pid: std::process::id(),
+            badge: self.identity.badge.clone(),
             profile: self.profile.clone(),
             now: self.outbox.connect(),
         })))?;

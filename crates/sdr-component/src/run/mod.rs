@@ -9,6 +9,7 @@
 //! ```
 
 mod ballast;
+mod door;
 mod identity;
 mod link;
 mod outbox;
@@ -20,7 +21,10 @@ mod wake;
 use std::io::Write;
 use std::process::ExitCode;
 
+use rustix::mm::{MlockAllFlags, mlockall};
+
 use crate::component::Component;
+use crate::protocol::ENV_LOCK_MEMORY;
 use crate::setup::Setup;
 use identity::Identity;
 use link::Link;
@@ -55,6 +59,12 @@ pub fn run<C: Component>() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    if std::env::var_os(ENV_LOCK_MEMORY).is_some() {
+        let flags = MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT;
+        if let Err(error) = mlockall(flags) {
+            crate::log(format_args!("{}: memory is not locked: {error}", C::NAME));
+        }
+    }
     match Link::start(identity.clone(), profile.clone()) {
         Ok(link) => Runner::<C>::new(identity, profile, link).run(),
         Err(error) => {

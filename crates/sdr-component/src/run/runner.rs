@@ -174,7 +174,9 @@ impl<C: Component> Runner<C> {
         }
         for input in &self.inputs {
             let mut core = input.lock();
-            counters.inputs.extend(core.connections.iter_mut().map(|one| one.statistics.take()));
+            counters
+                .inputs
+                .extend(core.connections.iter_mut().map(|one| one.statistics.take(now_ns)));
         }
         self.link.outbox.say(FromComponent::Counters(counters));
     }
@@ -202,11 +204,13 @@ impl<C: Component> Runner<C> {
         self.report_state();
     }
 
-    /// Outputs write nothing and inputs take nothing from here on.
+    /// Outputs write nothing but their safe value and inputs take nothing from here on.
     pub(super) fn silence(&mut self) {
         self.token = None;
         for output in &self.outputs {
-            output.lock().set_token(None);
+            if let Err(error) = output.lock().fall_silent() {
+                crate::log(format_args!("{}: the safe value was not sent: {error}", C::NAME));
+            }
         }
         for input in &self.inputs {
             input.lock().stop_listening();

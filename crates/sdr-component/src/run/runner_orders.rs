@@ -32,6 +32,7 @@ impl<C: Component> Runner<C> {
                     crate::log(format_args!("{}: the agent says: {}", C::NAME, error.message));
                     Ok(())
                 }
+                News::Alone => self.stop_alone(),
                 News::Orphaned => {
                     self.is_orphan = true;
                     self.finish()
@@ -159,6 +160,15 @@ impl<C: Component> Runner<C> {
         self.silence();
         self.owe(owed);
         Ok(())
+    }
+
+    /// Nobody is there who could stop it, or hear others: it must not act any more.
+    fn stop_alone(&mut self) -> Result<(), String> {
+        if self.life.state() != LifecycleState::Active {
+            return Ok(());
+        }
+        crate::log(format_args!("{}: without an agent for too long; deactivated", C::NAME));
+        self.deactivate()
     }
 
     fn reset(&mut self) -> Result<(), String> {

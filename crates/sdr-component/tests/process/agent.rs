@@ -8,9 +8,9 @@ use std::process::{Child, Command, ExitStatus};
 use std::time::Duration;
 
 use sdr_component::protocol::{
-    Configure, ENV_COMPONENT, ENV_INSTANCE, ENV_ORPHAN_MS, ENV_SOCKET, ExecutionSetup,
-    FromComponent, Hello, LineBuffer, Order, PROTOCOL_VERSION, SharedMemory, StateReport,
-    ToComponent, encode_line,
+    Configure, ENV_COMPONENT, ENV_INSTANCE, ENV_LEASE_MS, ENV_ORPHAN_MS, ENV_SOCKET,
+    ExecutionSetup, FromComponent, Hello, LineBuffer, Order, PROTOCOL_VERSION, SharedMemory,
+    StateReport, ToComponent, encode_line,
 };
 use sdr_core::{
     effect::InputWiring,
@@ -36,6 +36,8 @@ pub(crate) struct Agent {
     folder: tempfile::TempDir,
     listener: UnixListener,
     pub(crate) memory: SharedMemory,
+    /// How long its components may act without it.
+    pub(crate) lease: Option<Duration>,
 }
 
 impl Agent {
@@ -44,7 +46,7 @@ impl Agent {
         let word = folder.path().file_name().unwrap().to_str().unwrap().replace(".tmp", "");
         let listener = UnixListener::bind(folder.path().join("s")).unwrap();
         let memory = SharedMemory { prefix: format!("p{word}_"), root: folder.path().join("m") };
-        Self { folder, listener, memory }
+        Self { folder, listener, memory, lease: None }
     }
 
     fn socket(&self) -> PathBuf {
@@ -62,7 +64,20 @@ impl Agent {
         if let Some(ms) = orphan_ms {
             command.env(ENV_ORPHAN_MS, ms.to_string());
         }
+        if let Some(lease) = self.lease {
+            command.env(ENV_LEASE_MS, lease.as_millis().to_string());
+        }
         Process(command.spawn().unwrap())
+    }
+
+    /// Nobody listens for that long; then another agent does.
+    pub(crate) fn be_away(&mut self, time: Duration) {
+        std::fs::remove_file(self.socket()).unwrap();
+        // Closes the old one, too: it would still take connections.
+        self.listener = UnixListener::bind(self.folder.path().join("elsewhere")).unwrap();
+        std::fs::remove_file(self.folder.path().join("elsewhere")).unwrap();
+        std::thread::sleep(time);
+        self.listener = UnixListener::bind(self.socket()).unwrap();
     }
 
     /// The next connection, and its greeting.

@@ -7,6 +7,8 @@
 
 mod agent;
 
+use std::time::Duration;
+
 use agent::{Agent, key, token};
 use sdr_component::message::{Encode, std_msgs::Int32};
 use sdr_component::protocol::{
@@ -29,7 +31,7 @@ impl Component for Doubler {
     fn new(setup: &mut Setup) -> Result<Self, ComponentError> {
         Ok(Self {
             number: setup.input("number")?,
-            double: setup.output("double")?,
+            double: setup.output("double")?.with_safe(&Int32 { data: 0 })?,
             factor: setup.parameter("factor", 1, "by what")?,
         })
     }
@@ -171,6 +173,39 @@ fn a_raised_fault_and_a_panic_lead_to_the_error_state_with_their_reasons() {
 }
 
 #[test]
+fn the_last_sample_of_each_activation_is_the_safe_value() {
+    let agent = Agent::new();
+    let (process, mut line) = agent.prepare(None, ExecutionSetup::OnData);
+    let memory = Memory::open(&agent.memory, "test").unwrap();
+    let source = memory.publisher("test/source/number", 8, 64).unwrap();
+    let doubles = memory.subscriber("test/doubler/double", 8).unwrap();
+    let last = || {
+        let sample = std::iter::from_fn(|| doubles.receive().unwrap()).last()?;
+        Some((sample.payload().to_vec(), sample.header().run))
+    };
+
+    // Raises, panics, is told to deactivate, is told to finish.
+    for (run, number) in (1..).zip([-1, -2, 21, 21]) {
+        line.order(Order::Activate { token: token(1, run) });
+        line.until_state(LifecycleState::Active);
+        send(&source, &token(1, run), 1, number);
+        if number < 0 {
+            line.until_state(LifecycleState::Error);
+            line.order(Order::Reset);
+            line.until_state(LifecycleState::Inactive);
+        } else {
+            line.until(|word| matches!(word, FromComponent::Heard(_)).then_some(()));
+            line.order(if run == 3 { Order::Deactivate } else { Order::Finish });
+            let end = [LifecycleState::Inactive, LifecycleState::Finalized];
+            line.until_state(end[usize::from(run == 4)]);
+        }
+        assert_eq!(last(), Some((vec![0, 0, 0, 0], run)), "activation {run}");
+    }
+    assert_eq!(last(), None);
+    assert!(process.wait().success());
+}
+
+#[test]
 fn a_fault_is_told_with_the_error_and_not_again_with_the_end() {
     let agent = Agent::new();
     let process = agent.start(None);
@@ -262,6 +297,25 @@ fn a_component_outlives_its_agent_and_greets_the_next_one_with_what_it_knows() {
         _ => None,
     });
     assert_eq!(std::iter::from_fn(|| doubles.receive().unwrap()).count(), 2);
+}
+
+#[test]
+fn a_component_that_must_not_act_alone_deactivates_without_an_agent() {
+    let lease = Duration::from_millis(50);
+    let mut agent = Agent::new();
+    agent.lease = Some(lease);
+    let (_process, mut line) = agent.prepare(None, ExecutionSetup::OnData);
+    line.order(Order::Activate { token: token(1, 1) });
+    line.until_state(LifecycleState::Active);
+
+    // A busy machine may be late with its lease; it is never early.
+    let mut states = (1..=100).map(|times| {
+        agent.be_away(lease * times);
+        agent.greet().1.now
+    });
+    let last = states.find(|now| now.state != LifecycleState::Active).unwrap();
+
+    assert_eq!((last.state, last.token), (LifecycleState::Inactive, None));
 }
 
 #[test]

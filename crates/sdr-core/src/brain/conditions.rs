@@ -19,11 +19,13 @@ const HELP_WAIT: Duration = Duration::from_secs(5);
 impl Brain {
     /// A component is tried here again: it need not leave for an event of before.
     pub(super) fn call_off(&mut self, key: &ComponentKey) {
-        for ((system, cause), condition) in &mut self.conditions {
-            if is_event(*cause) && *system == key.system {
+        let mut conditions = core::mem::take(&mut self.conditions);
+        for ((system, cause), condition) in &mut conditions {
+            if *system == key.system && self.is_event(key, *cause) {
                 condition.components.retain(|name| *name != key.name);
             }
         }
+        self.conditions = conditions;
     }
 
     /// Publishes that components should leave; the coordinator acts.
@@ -99,7 +101,7 @@ impl Brain {
                 let active = self
                     .current(&key)
                     .is_some_and(|id| self.instances[&id].state == LifecycleState::Active);
-                here && match (condition.foreseen, is_event(*cause)) {
+                here && match (condition.foreseen, self.is_event(&key, *cause)) {
                     (true, _) => foreseen.contains_key(&(system.clone(), *cause)),
                     (false, true) => !active,
                     (false, false) => still_raised(&standing, &key, *cause),
@@ -134,7 +136,7 @@ impl Brain {
         for key in self.said.unanswered(now, HELP_WAIT) {
             let here = self.home(&key) == Some(&self.me);
             let waits = |condition: &ConditionReport| {
-                is_event(condition.cause) && condition.components.contains(&key.name)
+                self.is_event(&key, condition.cause) && condition.components.contains(&key.name)
             };
             if !here || !self.conditions.values().any(waits) {
                 continue;
@@ -146,37 +148,22 @@ impl Brain {
         }
     }
 
+    /// Whether a cause is an event of a component rather than a figure over time.
+    fn is_event(&self, key: &ComponentKey, cause: Cause) -> bool {
+        let engine = self.engines.get(&key.system);
+        engine.map_or(cause.is_event(), |engine| engine.recovery().is_event(key, cause))
+    }
+
     /// Whether local attempts at a component ended: it is held, or waits to leave.
     pub(super) fn is_given_up(&self, key: &ComponentKey) -> bool {
         let leaves = |condition: &ConditionReport| {
             condition.system == key.system
-                && is_event(condition.cause)
+                && self.is_event(key, condition.cause)
                 && condition.components.contains(&key.name)
         };
         self.held.contains_key(key)
             || self.failed.contains(key)
             || self.conditions.values().any(leaves)
-    }
-}
-
-/// Whether a cause is an event of a component rather than a figure over time.
-pub(super) fn is_event(cause: Cause) -> bool {
-    match cause {
-        Cause::Exited
-        | Cause::Hung
-        | Cause::Error
-        | Cause::HardwareLost
-        | Cause::AbnormalBehaviour
-        | Cause::EmergencyStop
-        | Cause::RobotGone => true,
-        Cause::MemoryShort
-        | Cause::ComponentCpuHigh
-        | Cause::BatteryLow
-        | Cause::RobotCpuHigh
-        | Cause::RssiLow
-        | Cause::DelayHigh
-        | Cause::JitterHigh
-        | Cause::LossHigh => false,
     }
 }
 

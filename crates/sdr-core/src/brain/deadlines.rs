@@ -31,6 +31,8 @@ impl Brain {
             .chain(self.desk_of_role.wake_at)
             .chain(self.lease.wake_at)
             .chain(self.guard.wake_at)
+            .chain(self.lost.wake_at)
+            .chain(self.told.next_deadline())
             .chain(self.spare_plans.values().map(|plan| plan.at))
             .chain((!self.began).then(|| self.begin_deadline()))
             .chain(self.newborn_deadline())

@@ -37,6 +37,7 @@ impl Brain {
         if self.desk.is_minting() || self.plans.asked.is_some() || !self.may_begin(now) {
             return;
         }
+        self.watch_lost(now);
         for system in self.systems_to_look_at(now) {
             if self.ask_for_orphans(now, &system)
                 || self.ask_for_leavers(now, &system)
@@ -57,6 +58,8 @@ impl Brain {
         };
         self.index.troubled.retain(tells);
         let gone = self.index.absent.iter().filter(|home| self.is_gone(home, now));
+        let doubted = self.lost.doubted();
+        let gone = gone.chain(doubted);
         let mut names: BTreeSet<&Name> =
             gone.flat_map(|home| self.index.at(home)).map(|key| &key.system).collect();
         names.extend(self.index.unplaced());
@@ -96,9 +99,11 @@ impl Brain {
     fn ask_for_leavers(&mut self, now: Instant, system: &SystemNow) -> bool {
         for (from, condition) in self.calls_for_help(&system.name) {
             let leaves = |name: &&Name| {
-                self.wanted(&system.key(name)).is_some_and(|(_, assignment)| {
-                    assignment.home == from && assignment.target.is_none()
-                })
+                let key = system.key(name);
+                self.latched(&key).is_none()
+                    && self.wanted(&key).is_some_and(|(_, assignment)| {
+                        assignment.home == from && assignment.target.is_none()
+                    })
             };
             let names: Vec<Name> = condition.components.iter().filter(leaves).cloned().collect();
             let (cause, reason) = (condition.cause, condition.reason.clone());
@@ -194,8 +199,9 @@ impl Brain {
         for name in names {
             let list = avoid.entry(name.clone()).or_default();
             list.extend(ill.iter().cloned());
+            list.extend(self.lost_robots());
             for (robot, condition) in &calls {
-                let robot_wide = !super::conditions::is_event(condition.cause);
+                let robot_wide = condition.cause.is_of_robot();
                 if robot_wide || condition.components.contains(name) {
                     list.push((robot.clone(), condition.cause.to_string()));
                 }

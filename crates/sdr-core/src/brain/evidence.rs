@@ -5,7 +5,7 @@ use alloc::{collections::BTreeSet, vec::Vec};
 use super::Brain;
 use crate::{
     id::{ComponentKey, Name, RobotId},
-    recover::{Evidence, RobotEvidence},
+    recover::{Evidence, RobotEvidence, Spread},
     report::LinkReport,
     units::Permille,
 };
@@ -21,8 +21,11 @@ impl Brain {
                 continue;
             }
             let fault = self.faults.remove(&component);
-            let usage = self.current(&component).map(|id| self.instances[&id].usage);
-            let usage = usage.unwrap_or_default();
+            let current = self.current(&component).map(|id| &self.instances[&id]);
+            let usage = current.map(|instance| instance.usage).unwrap_or_default();
+            let inputs_late = current.map_or(0, |instance| instance.inputs_late);
+            let deadlines_missed = current.map_or(0, |instance| instance.deadlines_missed);
+            let told = self.told.of(&component);
             evidence.push(Evidence {
                 fault,
                 actuator: spec.actuator,
@@ -31,6 +34,9 @@ impl Brain {
                 memory: usage.memory,
                 cpu: usage.cpu,
                 cpu_limit: spec.needs.cpu,
+                deadlines_missed,
+                inputs_late,
+                told,
                 robot: self.robot_evidence(&component),
                 component,
             });
@@ -62,9 +68,9 @@ impl Brain {
         let living = partners.iter().filter(|robot| self.mesh.is_alive(robot));
         let used: Vec<LinkReport> = living.filter_map(|robot| self.mesh.link(robot)).collect();
         RobotEvidence {
-            delay: median(used.iter().map(|link| link.rtt / 2).collect()),
-            jitter: median(used.iter().map(|link| link.jitter).collect()),
-            loss: median(used.iter().map(|link| link.loss).collect()),
+            delay: Spread::over(used.iter().map(|link| link.rtt / 2).collect()),
+            jitter: Spread::over(used.iter().map(|link| link.jitter).collect()),
+            loss: Spread::over(used.iter().map(|link| link.loss).collect()),
             ..self.figures_of(&self.me).unwrap_or_default()
         }
     }
@@ -82,9 +88,4 @@ impl Brain {
         });
         others.filter_map(|name| self.home(&system.key(name)).cloned()).collect()
     }
-}
-
-fn median<T: Ord + Copy>(mut values: Vec<T>) -> Option<T> {
-    values.sort_unstable();
-    values.get(values.len() / 2).copied()
 }

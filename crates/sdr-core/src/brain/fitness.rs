@@ -3,7 +3,7 @@
 use alloc::{format, vec::Vec};
 use core::cmp::Reverse;
 
-use super::{Brain, conditions::is_event};
+use super::Brain;
 use crate::{
     fitness::{Figures, Fitness, RolePolicy},
     id::RobotId,
@@ -107,7 +107,7 @@ impl Brain {
     fn trouble_of(&self, robot: &RobotId) -> Option<alloc::string::String> {
         let author = self.mesh.authors().author(robot);
         let mut told = author.into_iter().flat_map(|author| author.conditions());
-        let told = told.find(|condition| !is_event(condition.cause));
+        let told = told.find(|condition| condition.cause.is_of_robot());
         let told = told.map(|condition| format!("{}: {}", condition.cause, condition.reason));
         told.or_else(|| {
             let figures = self.figures_of(robot)?;

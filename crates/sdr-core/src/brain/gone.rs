@@ -104,9 +104,14 @@ impl Brain {
         for spec in &running.components {
             let component = running.key(&spec.name);
             let Some(home) = self.home(&component) else { continue };
-            let gone = self.is_gone(home, now) && !self.is_just_told(&component, now);
+            let gone = self.is_gone(home, now) && !self.is_just_told(&component, now)
+                || self.is_lost(now, &component, home);
             let free = self.lease_is_over(now, home, spec);
             if !gone || !free || !self.succession_is_over(now, &component) {
+                continue;
+            }
+            // What drives a body stays where it stopped until somebody resets it.
+            if self.latched(&component).is_some() {
                 continue;
             }
             let reason = format!("{home} is not heard any more");
@@ -120,6 +125,9 @@ impl Brain {
                 memory: Bytes(0),
                 cpu: Permille(0),
                 cpu_limit: spec.needs.cpu,
+                deadlines_missed: 0,
+                inputs_late: 0,
+                told: Vec::new(),
                 robot: RobotEvidence::default(),
             });
         }

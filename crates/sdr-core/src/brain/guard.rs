@@ -107,6 +107,8 @@ impl Brain {
     /// What stands by here, its instance ready or only its place kept.
     fn followed(&self) -> Vec<Followed> {
         let keys = self.index.beside(&self.me);
+        // What drives a body and stopped stays where it is.
+        let keys = keys.filter(|key| self.latched(key).is_none());
         keys.filter_map(|key| {
             let (_, assignment) = self.wanted(key)?;
             let place = assignment.standbys.iter().position(|robot| *robot == self.me)?;
@@ -132,6 +134,17 @@ impl Brain {
 
     /// Whether the time to follow a home has come, after asking others for news of it.
     fn is_due(&mut self, now: Instant, one: &Followed) -> bool {
+        if let Some(until) = self.held_until(now, &one.home) {
+            self.guard.suspects.remove(&one.home);
+            self.wake_guard(until);
+            return false;
+        }
+        // a planned restart of its agent: its components go on
+        if let Some(until) = self.held_until(now, &one.home) {
+            self.guard.suspects.remove(&one.home);
+            self.wake_guard(until);
+            return false;
+        }
         let age = self.mesh.age(&one.home, now).unwrap_or_else(|| now.since(self.started_at));
         let silent = age.min(now.since(self.guard.on_time_since));
         let pair = self.mesh.authors().count() <= 2;

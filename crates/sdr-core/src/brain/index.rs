@@ -10,6 +10,7 @@ use alloc::{
 use super::Brain;
 use crate::{
     id::{ComponentKey, Name, RobotId},
+    input::Input,
     mesh::Fact,
     order::Version,
     record::Assignment,
@@ -176,6 +177,27 @@ fn count_down(counts: &mut BTreeMap<Name, usize>, name: &Name) {
 }
 
 impl Brain {
+    /// What an input makes worth looking at; datagrams do so by their news.
+    pub(super) fn stir_for(&mut self, input: &Input) {
+        match input {
+            Input::Tick | Input::Datagram { .. } => {}
+            Input::Host(_) | Input::Told { .. } => self.judge_due = true,
+            Input::Usage(_) => self.usage_due = true,
+            Input::Facts(_)
+            | Input::Instance { .. }
+            | Input::Route { .. }
+            | Input::Deploy { .. }
+            | Input::Undeploy { .. }
+            | Input::Reset { .. }
+            | Input::MoveRole { .. }
+            | Input::RolePolicy { .. }
+            | Input::Hold { .. }
+            | Input::Planned { .. }
+            | Input::Stored { .. }
+            | Input::StoreFailed { .. } => self.stir = Stir::ALL,
+        }
+    }
+
     /// Looks anew at where a component stands.
     pub(super) fn reindex(&mut self, key: &ComponentKey) {
         self.index.forget(key);

@@ -16,7 +16,7 @@ use crate::{
     input::{InstanceId, InstanceNews},
     lifecycle::LifecycleState,
     order::{Run, Token},
-    recover::{Cause, Fault},
+    recover::{Cause, Fault, HangLimit},
     report::Usage,
     time::{Duration, Instant},
 };
@@ -38,10 +38,20 @@ pub(super) enum Told {
     Finish,
 }
 
+/// Where a process comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Origin {
+    /// This agent started it.
+    Started,
+    /// It outlived the agent before; its state is known once it has greeted.
+    Adopted { pid: u32, greeted: bool },
+}
+
 /// One started process.
 #[derive(Clone, Debug)]
 pub(super) struct Instance {
     pub(super) component: ComponentKey,
+    pub(super) origin: Origin,
     /// Hash of its spec and wiring: another one needs another process.
     pub(super) shape: u64,
     /// The edition of its system that it was last found to fit.
@@ -53,12 +63,21 @@ pub(super) struct Instance {
     pub(super) ready: bool,
     pub(super) usage: Usage,
     pub(super) heard: BTreeMap<u16, Token>,
+    /// Late samples by input connection, as it counts them.
+    pub(super) late: BTreeMap<u16, u64>,
+    /// Deadlines of readers here that its outputs missed.
+    pub(super) deadlines_missed: u64,
+    /// Deadlines that its inputs from other robots missed.
+    pub(super) inputs_late: u64,
+    /// The silence after which its keeper takes it for hung.
+    pub(super) patience: Option<HangLimit>,
 }
 
 impl Instance {
     pub(super) fn new(component: ComponentKey, shape: u64) -> Self {
         Self {
             component,
+            origin: Origin::Started,
             shape,
             fits: None,
             state: LifecycleState::Created,
@@ -68,6 +87,10 @@ impl Instance {
             ready: false,
             usage: Usage::default(),
             heard: BTreeMap::new(),
+            late: BTreeMap::new(),
+            deadlines_missed: 0,
+            inputs_late: 0,
+            patience: None,
         }
     }
 
@@ -77,6 +100,10 @@ impl Instance {
 
     pub(super) fn is_ending(&self) -> bool {
         self.told == Told::Finish
+    }
+
+    pub(super) fn is_adopted(&self) -> bool {
+        matches!(self.origin, Origin::Adopted { .. })
     }
 }
 
@@ -126,15 +153,23 @@ impl Brain {
     }
 
     pub(super) fn handle_instance(&mut self, now: Instant, id: InstanceId, news: InstanceNews) {
+        if let InstanceNews::Adopted(adoption) = news {
+            return self.take_over(id, *adoption);
+        }
         let Some(instance) = self.instances.get(&id) else { return };
         let key = instance.component.clone();
         match news {
+            InstanceNews::Adopted(_) => {}
             InstanceNews::Started { pid } => {
                 let event = Event::new("started", &self.me, format!("process {pid}")).about(&key);
                 self.push_event(event.number("pid", f64::from(pid)));
             }
             InstanceNews::LaunchFailed { reason } => self.lose(id, &key, Cause::Exited, reason),
             InstanceNews::Exited { reason } => self.lose(id, &key, Cause::Exited, reason),
+            InstanceNews::OutOfMemory { reason } => {
+                self.event_about("out-of-memory", &key, reason.clone());
+                self.lose(id, &key, Cause::Exited, reason);
+            }
             InstanceNews::Hung { .. } if instance.is_ending() => self.kill_again(id),
             InstanceNews::Hung { reason } => {
                 self.event_about("hung", &key, reason.clone());
@@ -150,6 +185,7 @@ impl Brain {
                 }
             }
             InstanceNews::Heard { connection, token } => self.handle_heard(id, connection, token),
+            InstanceNews::Late { connection, count } => self.handle_late(id, connection, count),
         }
     }
 
@@ -161,15 +197,22 @@ impl Brain {
     ) {
         let Some(instance) = self.instances.get_mut(&id) else { return };
         let changed = instance.state != state || instance.token != token;
+        let acted =
+            matches!(&instance.told, Told::Activate(told) if Some(told) == instance.token.as_ref());
+        if acted && state == LifecycleState::Inactive {
+            // it stopped by itself, without an agent for too long: what it was told is over
+            instance.told = Told::Nothing;
+        }
         instance.state = state;
         instance.token.clone_from(&token);
-        if state == LifecycleState::Inactive {
+        if matches!(state, LifecycleState::Inactive | LifecycleState::Active) {
             instance.inactive_at.get_or_insert(now);
         }
+        let key = instance.component.clone();
+        self.welcome(id);
         if !changed {
             return;
         }
-        let key = instance.component.clone();
         let kind = match state {
             LifecycleState::Created => "created",
             LifecycleState::Inactive => "inactive",
@@ -195,6 +238,43 @@ impl Brain {
             .map_or_else(|| connection.to_string(), |c| c.label());
         let event = Event::new("heard", &self.me, label).about(&key).under(&token);
         self.push_event(event.number("connection", f64::from(connection)));
+    }
+
+    /// Whose fault a missed deadline is: its writer's, when that runs here; else all that is
+    /// known is that the reader does not get what it needs.
+    fn handle_late(&mut self, id: InstanceId, connection: u16, count: u64) {
+        let Some(instance) = self.instances.get_mut(&id) else { return };
+        let before = instance.late.insert(connection, count).unwrap_or(0);
+        let missed = count.saturating_sub(before);
+        let key = instance.component.clone();
+        let Some(system) = self.systems.get(&key.system) else { return };
+        let wire = system.connections.iter().find(|wire| wire.index == connection);
+        let Some(writer) = wire.map(|wire| system.key(&wire.from.component)) else { return };
+        if self.home(&writer) != Some(&self.me) {
+            self.instances.get_mut(&id).expect("found above").inputs_late += missed;
+            return;
+        }
+        // While it does not run, that is the fault, and it is seen by itself.
+        let writer = self.current(&writer).and_then(|id| self.instances.get_mut(&id));
+        if let Some(writer) = writer.filter(|one| one.state == LifecycleState::Active) {
+            writer.deadlines_missed += missed;
+        }
+    }
+
+    /// Tells keepers how long the policy lets their components be silent.
+    pub(super) fn update_patience(&mut self) {
+        let mut changed = Vec::new();
+        for (id, instance) in &self.instances {
+            let engine = self.engines.get(&instance.component.system);
+            let limit = engine.and_then(|one| one.recovery().hang_limit(&instance.component));
+            if engine.is_some() && limit != instance.patience {
+                changed.push((*id, limit));
+            }
+        }
+        for (id, limit) in changed {
+            self.instances.get_mut(&id).expect("listed above").patience = limit;
+            self.command(id, Command::Patience(limit));
+        }
     }
 
     /// A process ended or never was; a fault unless it was told to end.

@@ -22,6 +22,9 @@ const ASK_AGAIN: Duration = Duration::from_millis(400);
 const ANSWERS_AFTER: [Duration; 2] = [Duration::from_millis(60), Duration::from_millis(200)];
 /// After isolation, signs must have come for so long: a new home may have been chosen.
 const REGAIN: Duration = Duration::from_secs(2);
+/// What was adopted while it acts may go on so long without a first sign: its component went
+/// on for at most as long without an agent, and a successor waits for [`MARGIN`].
+const ADOPTION_GRACE: Duration = Duration::from_millis(400);
 /// A successor waits so much longer than the lease: clocks drift, timers are late.
 const MARGIN: Duration = Duration::from_secs(1);
 
@@ -74,7 +77,9 @@ impl Brain {
         let answers = self.lease.answers_at();
         let ends = self.lease.acked_at.map(|at| at + after);
         let regained = self.lease.since.map(|at| at + REGAIN);
-        let ahead = ends.into_iter().chain(regained).chain(answers).filter(|at| *at > now);
+        let first = self.lease.acked_at.is_none().then(|| self.started_at + ADOPTION_GRACE);
+        let ahead = ends.into_iter().chain(regained).chain(answers).chain(first);
+        let ahead = ahead.filter(|at| *at > now);
         self.lease.wake_at = ahead.chain([next]).min();
     }
 
@@ -112,7 +117,8 @@ impl Brain {
         // the first sign after an isolation is not enough
         let lasting = self.lease.since.is_none_or(|at| now >= at + REGAIN);
         let acts = self.current(key).is_some_and(|id| self.instances[&id].is_told_to_act());
-        acked && (acts || lasting)
+        let graced = self.lease.acked_at.is_none() && now < self.started_at + ADOPTION_GRACE;
+        (acked && (acts || lasting)) || (acts && graced)
     }
 
     /// A fleet of one: nobody could take over.

@@ -74,6 +74,7 @@ impl Brain {
         self.judge_due = false;
         let names: Vec<Name> = self.index.my_systems().cloned().collect();
         self.engines.retain(|name, _| names.contains(name));
+        self.told.keep(&names);
         for name in names {
             let evidence = self.evidence(&name);
             if !self.ensure_engine(&name) {
@@ -85,8 +86,10 @@ impl Brain {
                 self.carry_out(now, &name, verdict);
             }
             self.foresee(now, &name);
+            self.ask_programs(now, &name, evidence);
         }
         self.clear_conditions(now);
+        self.update_patience();
     }
 
     /// A fault that the policy says nothing about is told, and nothing is tried.
@@ -94,7 +97,7 @@ impl Brain {
         for seen in evidence {
             let Some(fault) = &seen.fault else { continue };
             let engine = &self.engines[name];
-            if !engine.recovery().has_rule(fault.cause) {
+            if !engine.recovery().has_rule(&seen.component, fault.cause) {
                 let text = format!(
                     "no rule for {} in recovery `{}`: {}",
                     fault.cause, engine.policy.name, fault.reason
@@ -166,7 +169,11 @@ impl Brain {
             Remedy::Hold => {
                 let text = format!("{}: {}", verdict.cause, verdict.reason);
                 self.held.insert(key.clone(), text.clone());
-                self.event_about("held", &key, text);
+                self.event_about("held", &key, text.clone());
+                let latched = self.engines.get(system).map(|one| one.recovery.is_latched(&key));
+                if latched == Some(true) {
+                    self.latch(&key, text);
+                }
                 None
             }
         };

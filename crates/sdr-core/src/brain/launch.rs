@@ -31,6 +31,9 @@ impl Brain {
         if !due || ending || !self.may_begin(now) || self.is_given_up(key) {
             return;
         }
+        if self.refuse_without_device(key) {
+            return;
+        }
         self.restarts.remove(key);
         self.launch(key);
     }
@@ -120,7 +123,7 @@ impl Brain {
 }
 
 /// Hash of what a process is started with; the place in the file does not matter.
-fn shape_hash(spec: &ComponentSpec, inputs: &[InputWiring]) -> u64 {
+pub(super) fn shape_hash(spec: &ComponentSpec, inputs: &[InputWiring]) -> u64 {
     let mut spec = spec.clone();
     spec.index = 0;
     let bytes = postcard::to_allocvec(&(spec, inputs)).expect("writing plain data cannot fail");

@@ -10,10 +10,12 @@
 //! `decide` acts only on the coordinator, and only mints records; every robot `reconcile`s
 //! what should be on itself with what is. Nothing is ever told to another robot but records.
 
+mod adopt;
 mod conditions;
 mod config;
 mod deadlines;
 mod decide;
+mod devices;
 mod effects;
 mod epochs;
 mod evidence;
@@ -21,11 +23,14 @@ mod fitness;
 mod gone;
 mod guard;
 mod handover;
+mod hold;
 mod index;
 mod instances;
 mod isolation;
 mod judge;
+mod latch;
 mod launch;
+mod lost;
 mod minting;
 mod moves;
 mod newborn;
@@ -47,6 +52,7 @@ mod systems;
 mod takeover;
 #[cfg(test)]
 mod tests;
+mod told;
 
 use alloc::{
     boxed::Box,
@@ -71,10 +77,12 @@ use crate::{
 };
 use epochs::EpochBook;
 use guard::GuardDesk;
+use hold::Holds;
 use index::{Index, Stir};
 use instances::{Instance, RunBook};
 use isolation::Lease;
 use judge::{Engine, Objector, RestartPlan};
+use lost::LostDesk;
 use minting::Desk;
 use moves::MoveWatch;
 use plans::PlanDesk;
@@ -82,6 +90,7 @@ use role::RoleDesk;
 use say::Said;
 use spare::SparePlan;
 use systems::SystemNow;
+use told::ToldDesk;
 
 /// A handler that was not called for so long was itself paused: it judges nobody by it.
 const PAUSE_MIN: Duration = Duration::from_millis(800);
@@ -134,6 +143,8 @@ pub struct Brain {
     foreseen_until: BTreeMap<(Name, Cause), Instant>,
     restarts: BTreeMap<ComponentKey, RestartPlan>,
     held: BTreeMap<ComponentKey, String>,
+    /// Components that must not act until they are reset, and why.
+    latches: BTreeMap<ComponentKey, String>,
     /// Components that failed here and wait for their ladder's word.
     failed: BTreeSet<ComponentKey>,
     judge_due: bool,
@@ -146,6 +157,8 @@ pub struct Brain {
     /// Components that wish for a standby on another robot, and why none takes it.
     unbacked: BTreeMap<ComponentKey, alloc::vec::Vec<Refusal>>,
 
+    told: ToldDesk,
+    lost: LostDesk,
     plans: PlanDesk,
     moves: BTreeMap<ComponentKey, MoveWatch>,
     left: BTreeMap<(ComponentKey, RobotId), Instant>,
@@ -154,6 +167,7 @@ pub struct Brain {
     desk: Desk,
     desk_of_role: RoleDesk,
     lease: Lease,
+    holds: Holds,
     duplicates_told: BTreeSet<core::net::SocketAddr>,
 }
 
@@ -208,6 +222,7 @@ impl Brain {
             foreseen_until: BTreeMap::new(),
             restarts: BTreeMap::new(),
             held: BTreeMap::new(),
+            latches: BTreeMap::new(),
             failed: BTreeSet::new(),
             judge_due: false,
             usage_due: false,
@@ -217,6 +232,8 @@ impl Brain {
             epochs: epochs.collect(),
             guard: GuardDesk::default(),
             unbacked: BTreeMap::new(),
+            told: ToldDesk::default(),
+            lost: LostDesk::default(),
             plans: PlanDesk::default(),
             moves: BTreeMap::new(),
             left: BTreeMap::new(),
@@ -224,8 +241,10 @@ impl Brain {
             desk: Desk::default(),
             desk_of_role: RoleDesk::default(),
             lease: Lease::default(),
+            holds: Holds::default(),
             duplicates_told: BTreeSet::new(),
         });
+        brain.read_latches();
         brain.refresh_all_systems();
         brain.say_facts();
         brain.store_now();
@@ -245,35 +264,12 @@ impl Brain {
         self.settle(now);
     }
 
-    /// What an input makes worth looking at; datagrams do so by their news.
-    fn stir_for(&mut self, input: &Input) {
-        match input {
-            Input::Tick | Input::Datagram { .. } => {}
-            Input::Host(_) => self.judge_due = true,
-            Input::Usage(_) => self.usage_due = true,
-            Input::Facts(_)
-            | Input::Instance { .. }
-            | Input::Route { .. }
-            | Input::Deploy { .. }
-            | Input::Undeploy { .. }
-            | Input::MoveRole { .. }
-            | Input::RolePolicy { .. }
-            | Input::Planned { .. }
-            | Input::Stored { .. }
-            | Input::StoreFailed { .. } => self.stir = Stir::ALL,
-        }
-    }
-
     fn take(&mut self, now: Instant, input: Input) {
         match input {
             Input::Tick => {}
             Input::Datagram { from, bytes } => self.mesh.handle_datagram(now, from, &bytes),
             Input::Host(host) => self.host = Some(host),
-            Input::Facts(facts) => {
-                self.config.facts = *facts;
-                self.say_facts();
-                self.plans.retry_soon();
-            }
+            Input::Facts(facts) => self.take_facts(*facts),
             Input::Usage(figures) => self.handle_usage(figures),
             Input::Instance { instance, news } => self.handle_instance(now, instance, news),
             Input::Route { path, matched } => {
@@ -281,8 +277,11 @@ impl Brain {
             }
             Input::Deploy { request, system } => self.handle_deploy(request, system),
             Input::Undeploy { request, system } => self.handle_undeploy(request, &system),
+            Input::Reset { request, component } => self.handle_reset(request, &component),
             Input::MoveRole { request, to } => self.handle_move_role(request, &to),
             Input::RolePolicy { request, policy } => self.handle_role_policy(request, *policy),
+            Input::Told { question, result } => self.handle_told(now, question, result),
+            Input::Hold { time } => self.announce_hold(time),
             Input::Planned { plan, result } => self.handle_planned(now, plan, result),
             Input::Stored { ticket } => self.handle_stored(ticket),
             Input::StoreFailed { ticket, reason } => self.handle_store_failed(ticket, &reason),
@@ -335,7 +334,10 @@ impl Brain {
             self.keep_lease(now);
         }
         // before anything is reconciled: what failed must not be started behind the ladder's back
-        if self.judge_due || self.engines.values().any(|engine| engine.is_due(now)) {
+        if self.judge_due
+            || self.told.is_due(now)
+            || self.engines.values().any(|engine| engine.is_due(now))
+        {
             self.judge(now);
         }
         for _ in 0..SETTLE_ROUNDS_MAX {
@@ -349,6 +351,7 @@ impl Brain {
             if stir.here {
                 self.reconcile(now);
                 self.keep_beats();
+                self.beat_to_coordinator();
                 self.say_instances(now);
                 self.update_routes();
             }

@@ -235,7 +235,7 @@ impl Brain {
 
     pub(super) fn not_back_for(&self, key: &ComponentKey) -> Duration {
         let engine = self.systems.get(&key.system).and_then(|s| self.make_engine(&s.recovery));
-        engine.map_or(Duration::ZERO, |engine| engine.recovery().not_back_for())
+        engine.map_or(Duration::ZERO, |engine| engine.recovery().not_back_for(key))
     }
 
     /// An assignment under a new epoch.

@@ -19,12 +19,16 @@ impl Brain {
         let mut changed = Changed::default();
         while let Some(news) = self.mesh.poll_news() {
             match news {
-                MeshNews::Report(robot, spoken) => self.note_report(robot, &spoken),
+                MeshNews::Report(robot, spoken) => {
+                    self.note_hold(now, &robot);
+                    self.note_report(robot, &spoken);
+                }
                 MeshNews::Record(key) => {
                     self.desk.mark_dirty();
                     self.stir.fleet = true;
                     self.note_home(now, &key);
                     changed.note(&key);
+                    self.take_latch(&key);
                 }
                 MeshNews::Alive(robot) => {
                     self.note_presence(&robot);

@@ -7,7 +7,7 @@ use crate::{
     allocate::{Item, Pair, Problem, RobotOffer, Settled, Tier, Wire},
     id::{ComponentKey, Name, RobotId},
     report::{InstanceReport, LinkReport, Usage},
-    spec::{ComponentSpec, Needs, launch_hash},
+    spec::{self, ComponentSpec, Needs, launch_hash},
     units::Bytes,
 };
 
@@ -31,6 +31,18 @@ pub(super) struct Asking<'a> {
     pub(super) avoid: &'a BTreeMap<Name, Avoid>,
 }
 
+/// Where a component may go: what it says itself, and what those say of it that stay.
+fn wishes(system: &SystemNow, spec: &ComponentSpec, names: &[Name]) -> spec::Place {
+    let mut place = spec.place.clone();
+    let stays = |other: &&alloc::sync::Arc<ComponentSpec>| !names.contains(&other.name);
+    for other in system.components.iter().filter(stays) {
+        if other.place.apart_from.contains(&spec.name) && !place.apart_from.contains(&other.name) {
+            place.apart_from.push(other.name.clone());
+        }
+    }
+    place
+}
+
 impl Brain {
     /// The question where to put some components of `system`.
     pub(super) fn problem(&self, system: &SystemNow, asking: &Asking<'_>) -> Problem {
@@ -49,7 +61,7 @@ impl Brain {
                     needs: self.needs(system, spec),
                     launch: launch_hash(spec.launch.name()),
                     devices: spec.devices.clone(),
-                    place: spec.place.clone(),
+                    place: wishes(system, spec, names),
                     running_on: running.remove(&component).unwrap_or_default(),
                     avoid: avoid.get(&spec.name).cloned().unwrap_or_default(),
                     component,

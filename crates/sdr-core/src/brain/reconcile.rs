@@ -33,6 +33,7 @@ impl Brain {
         for key in self.mine() {
             match self.duty(&key) {
                 Duty::None if planted::is(Defect::UnwantedGoesOn) => {}
+                Duty::None if self.is_left_alone(&key) => {}
                 Duty::None => self.leave(&key),
                 Duty::Home(epoch) => self.be_home(now, &key, &epoch),
                 Duty::Standby => self.be_standby(now, &key),
@@ -77,6 +78,10 @@ impl Brain {
             self.finish(id);
             return;
         }
+        if self.latched(key).is_some() {
+            self.be_latched(id, key);
+            return;
+        }
         if !self.may_act(now, key) {
             self.be_silent(now, id, key);
             return;
@@ -84,16 +89,22 @@ impl Brain {
         let instance = &self.instances[&id];
         let fits = match &instance.told {
             // an older life's run: this robot had forgotten how often it had lived
-            Told::Activate(token) => token.epoch == *epoch && token.run > self.first_run(),
+            Told::Activate(token) => {
+                let of_this_life = token.run > self.first_run() || instance.is_adopted();
+                token.epoch == *epoch && of_this_life
+            }
             Told::Nothing | Told::Deactivate | Told::Finish => false,
         };
         let able = matches!(instance.state, LifecycleState::Inactive | LifecycleState::Active);
-        // what failed waits for its ladder's word, with a spare as without
-        let waits = self.failed.contains(key);
+        // what failed waits for its ladder's word, with a spare as without; and only what was
+        // adopted is there before this robot may begin (rule 7)
+        let waits = self.failed.contains(key) || !self.began;
         if !fits && able && !waits && self.predecessors_active(key) {
             self.activate(id, key, epoch);
         }
-        self.keep_spare(now, key);
+        if !self.is_left_alone(key) {
+            self.keep_spare(now, key);
+        }
     }
 
     /// It is the home, and must not act while nobody hears it.
@@ -119,7 +130,9 @@ impl Brain {
             self.launch_when_due(now, key);
             return;
         };
-        self.keep_spare(now, key);
+        if !self.is_left_alone(key) {
+            self.keep_spare(now, key);
+        }
         self.reserve_epochs(key);
         if self.is_old_edition(id, key) {
             self.finish(id);

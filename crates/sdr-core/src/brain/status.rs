@@ -58,6 +58,7 @@ impl Brain {
                     | Report::Link(..)
                     | Report::Instance(_)
                     | Report::Succession(_)
+                    | Report::Hold(_)
                     | Report::Homeless(_) => None,
                 })
                 .collect(),
@@ -109,6 +110,7 @@ impl Brain {
         let gone = home.as_ref().filter(|_| !alive).map(|home| format!("{home} is not heard"));
         let why = wanted.map(|(_, assignment)| assignment.reason.clone());
         let held = self.held.get(&key).map(|held| format!("held: {held}"));
+        let latched = self.latched(&key).map(|why| format!("latched until `sdr reset`: {why}"));
         let call = self.is_given_up(&key).then(|| self.call_of(&key)).flatten();
         ComponentView {
             name: spec.name.to_string(),
@@ -127,7 +129,8 @@ impl Brain {
                     assignment.standbys.iter().chain(target).map(ToString::to_string).collect()
                 })
                 .unwrap_or_default(),
-            reason: held
+            reason: latched
+                .or(held)
                 .or(call)
                 .or(gone)
                 .or(why)
@@ -147,6 +150,7 @@ impl Brain {
             Report::Homeless(homeless) if homeless.component == *key => Some(&homeless.refusals),
             Report::Homeless(_)
             | Report::Succession(_)
+            | Report::Hold(_)
             | Report::Facts(_)
             | Report::Host(_)
             | Report::Link(..)

@@ -39,6 +39,11 @@ impl Brain {
             }
             return;
         }
+        if let Some(until) = self.held_until(now, holder) {
+            self.desk_of_role.suspicion = None;
+            self.wake_for_role(until);
+            return;
+        }
         let window = self.holder_window(holder);
         let silent = self.mesh.age(holder, now);
         // one that was never heard since the start gets the same time to speak

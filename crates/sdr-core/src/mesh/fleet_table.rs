@@ -106,6 +106,7 @@ impl FleetTable {
             | FleetValue::Assignment(_)
             | FleetValue::Role(_)
             | FleetValue::RolePolicy(_)
+            | FleetValue::Latch(_)
             | FleetValue::Unknown => None,
         };
         if let Some(commons) = &self.commons {
@@ -161,6 +162,7 @@ impl FleetTable {
             | FleetValue::Recovery(_)
             | FleetValue::Assignment(_)
             | FleetValue::RolePolicy(_)
+            | FleetValue::Latch(_)
             | FleetValue::Unknown => None,
         }
     }

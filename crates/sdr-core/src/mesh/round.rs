@@ -81,6 +81,9 @@ pub enum BeatsFor {
     Succession,
     /// It stands by for what runs here.
     Standbys,
+    /// It decides, or will, where what runs here goes, and is to know soon when this robot is
+    /// silent.
+    Coordinator,
 }
 
 /// Robots that get a small sign of life more often.

@@ -61,6 +61,7 @@ impl AuthorKey {
             Report::Condition(condition) => Self::condition(&condition.system, condition.cause),
             Report::Succession(_) => Self::succession(),
             Report::Homeless(homeless) => Self::homeless(&homeless.component),
+            Report::Hold(_) => Self(String::from("d")),
         }
     }
 }
@@ -121,7 +122,11 @@ impl Spoken {
             Some(Report::Instance(instance)) => self.components.push(instance.component.clone()),
             Some(Report::Condition(_)) => self.conditions = true,
             Some(
-                Report::Host(_) | Report::Link(..) | Report::Succession(_) | Report::Homeless(_),
+                Report::Host(_)
+                | Report::Link(..)
+                | Report::Succession(_)
+                | Report::Homeless(_)
+                | Report::Hold(_),
             )
             | None => {}
         }

@@ -5,7 +5,7 @@ use core::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::Value;
+use super::{Limits, OnAgentDeath, Value};
 use crate::{
     id::{Name, RobotId},
     units::{Bytes, Permille},
@@ -38,6 +38,10 @@ pub struct ComponentSpec {
     pub standby: Standby,
     /// Values for its parameters, by name, in the file's order.
     pub parameters: Vec<(String, Value)>,
+    /// What becomes of it when its agent dies; `None`: as its robot has it.
+    pub on_agent_death: Option<OnAgentDeath>,
+    /// What its process may take.
+    pub limits: Limits,
 }
 
 /// How a process is started. More kinds will be appended.

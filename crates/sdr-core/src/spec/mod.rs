@@ -5,6 +5,7 @@
 
 mod component;
 mod connection;
+mod limits;
 mod value;
 
 use alloc::vec::Vec;
@@ -21,6 +22,7 @@ pub use component::{
     StandbyKind, StandbyWhere,
 };
 pub use connection::{ConnectionSpec, PortRef, Qos, Reliability, port_path};
+pub use limits::{Limits, OnAgentDeath};
 pub use value::{LISTS_DEEP_MAX, Value};
 
 /// A policy as its crate encoded it; the core only carries it.
@@ -228,4 +230,4 @@ pub struct Deployment {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -9,7 +9,7 @@ fn name(word: &str) -> Name {
     Name::new(word).unwrap()
 }
 
-fn component(word: &str, after: &[&str]) -> ComponentSpec {
+pub(crate) fn component(word: &str, after: &[&str]) -> ComponentSpec {
     ComponentSpec {
         name: name(word),
         index: 0,
@@ -26,6 +26,8 @@ fn component(word: &str, after: &[&str]) -> ComponentSpec {
         },
         standby: Standby::default(),
         parameters: Vec::new(),
+        on_agent_death: None,
+        limits: Limits::default(),
     }
 }
 

@@ -7,7 +7,10 @@
 
 mod allocation;
 mod allocation_file;
+mod bar;
 mod bars;
+mod cause_words;
+mod condition_words;
 mod conditions;
 mod find;
 mod recovery;
@@ -24,6 +27,7 @@ use sdr_recovery::Policy as RecoveryPolicy;
 
 pub(crate) use allocation_file::AllocationFile;
 pub(crate) use find::{Finder, PolicyEntry, PolicyFile};
+pub(crate) use recovery::own_rules;
 pub(crate) use recovery_file::RecoveryFile;
 pub(crate) use role_file::RoleFile;
 pub use role_text::role_text;

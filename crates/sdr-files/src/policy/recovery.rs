@@ -6,14 +6,14 @@ use sdr_core::{
     recover::{Cause, GuardPolicy},
     units::Permille,
 };
-use sdr_recovery::{Ladder, LadderError, Limits, Policy, PolicyParts, Rule, Rung};
+use sdr_recovery::{Ladder, LadderError, Limits, Policy, PolicyParts, Rule, Rung, Trigger};
 
 use super::{
-    conditions::trigger,
-    find::{Finding, PolicyFile},
+    cause_words::{CauseEntry, cause_of},
+    conditions::{told, trigger},
+    find::{Finder, Finding, PolicyEntry, PolicyFile},
     recovery_file::{
         GuardTable, LimitsTable, RecoveryFile, RuleChanges, RuleTable, RulesEntry, UnknownFact,
-        cause_of,
     },
 };
 use crate::read::{At, Map, Reader};
@@ -37,17 +37,33 @@ impl PolicyFile for RecoveryFile {
     }
 
     fn checked(self, at: Finding<'_>, reader: &mut Reader) -> Option<Policy> {
-        let name = at.name(self.recovery, "recovery", reader);
-        let extended = self.extends.is_some();
-        let mut parts = match self.extends {
-            Some(extends) => at.finder.named::<Self>(&extends, reader)?.parts().clone(),
-            None => PolicyParts {
-                name: String::new(),
-                ladders: Vec::new(),
-                rules: Vec::new(),
-                limits: Limits::default(),
-            },
+        let name = at.name(self.recovery.clone(), "recovery", reader);
+        let base = match &self.extends {
+            Some(extends) => Some(at.finder.named::<Self>(extends, reader)?.parts().clone()),
+            None => None,
         };
+        let mut parts = self.over(base, reader);
+        parts.name = name?;
+        if !reader.is_clean() {
+            return None;
+        }
+        Policy::new(parts)
+            .map_err(|error| reader.problem(at.tree.mark, error.to_string(), None))
+            .ok()
+    }
+}
+
+impl RecoveryFile {
+    /// What the file makes of the policy that it extends.
+    fn over(self, base: Option<PolicyParts>, reader: &mut Reader) -> PolicyParts {
+        let extended = base.is_some();
+        let mut parts = base.unwrap_or_else(|| PolicyParts {
+            name: String::new(),
+            ladders: Vec::new(),
+            rules: Vec::new(),
+            limits: Limits::default(),
+            exceptions: Vec::new(),
+        });
         if let Some(changes) = &self.r#override
             && !extended
         {
@@ -78,13 +94,47 @@ impl PolicyFile for RecoveryFile {
             // What the rules do by themselves; the key says it to the reader.
             Some(UnknownFact) | None => {}
         }
-        parts.name = name?;
-        if !reader.is_clean() {
-            return None;
+        parts
+    }
+}
+
+/// Gives a component of a system with the policy `base` rules of its own: those of the policy
+/// that `entry` names, or `base` with the changes that stand there.
+pub(crate) fn own_rules(
+    base: &mut Policy,
+    component: &str,
+    entry: At<PolicyEntry<RecoveryFile>>,
+    finder: &Finder,
+    reader: &mut Reader,
+) {
+    let mark = entry.mark;
+    let own = match entry.value {
+        PolicyEntry::Named(word) => {
+            let word = At { value: word, mark };
+            let Some(named) = finder.named::<RecoveryFile>(&word, reader) else { return };
+            named
         }
-        Policy::new(parts)
-            .map_err(|error| reader.problem(at.tree.mark, error.to_string(), None))
-            .ok()
+        PolicyEntry::Inline(file, _) => {
+            for stray in [&file.recovery, &file.extends].into_iter().flatten() {
+                let help = String::from(
+                    "allowed: rules, override, ladders, limits; or the name of a policy alone",
+                );
+                let message = "a component's own rules change those of its system";
+                reader.problem(stray.mark, message, Some(help));
+            }
+            let parts = file.over(Some(base.for_component("").parts().clone()), reader);
+            if !reader.is_clean() {
+                return;
+            }
+            match Policy::new(parts) {
+                Ok(own) => own,
+                Err(error) => return reader.problem(mark, error.to_string(), None),
+            }
+        }
+    };
+    match base.with_exception(component, &own) {
+        Ok(with) => *base = with,
+        Err(error) => reader.problem(mark, error.to_string(), None),
     }
 }
 
@@ -122,7 +172,8 @@ fn change_rules(
         let Some(cause) = cause_of(&word, reader) else { continue };
         let index = parts.rules.iter().position(|rule| rule.cause == cause);
         let Some(index) = index else {
-            let known: Vec<&str> = parts.rules.iter().map(|rule| rule.cause.word()).collect();
+            let known: Vec<String> =
+                parts.rules.iter().map(|rule| rule.cause.to_string()).collect();
             let message = format!("the policy under `extends` has no rule for {cause}");
             let help = format!("it has: {}", known.join(", "));
             reader.problem(word.mark, message, Some(help));
@@ -130,9 +181,9 @@ fn change_rules(
         };
         changed.push(cause);
         let Some(change) = change else { continue };
-        let before = parts.rules[index].trigger;
+        let before = parts.rules[index].trigger.clone();
         let at = At { value: cause, mark: word.mark };
-        if let Some(trigger) = trigger(at, &change.value, Some(before), reader) {
+        if let Some(trigger) = trigger(at, &change.value, Some(&before), reader) {
             parts.rules[index].trigger = trigger;
         }
         let names = (change.value.ladder, change.value.actuator);
@@ -148,23 +199,57 @@ fn change_rules(
 
 fn add_rules(rules: Vec<At<RuleTable>>, parts: &mut PolicyParts, reader: &mut Reader) {
     for rule in rules {
-        let (cause, changes) = rule.value.split();
-        let cause = cause.map(|cause| cause.0);
-        if parts.rules.iter().any(|other| other.cause == cause.value) {
-            let message = format!("cause {} has two rules", cause.value);
-            let help = String::from("one rule for each; under `extends`, change it in `override`");
-            reader.problem(cause.mark, message, Some(help));
-            continue;
-        }
-        let trigger = trigger(cause.clone(), &changes, None, reader);
+        let (entry, changes) = rule.value.split();
+        let seen = seen_by(entry, &changes, reader);
+        let Some(first) = seen.first().map(|(cause, _)| cause.clone()) else { continue };
         if changes.ladder.is_none() {
-            let message = format!("the rule for {} has no `ladder`", cause.value);
-            reader.problem(cause.mark, message, Some(format!("allowed: {}", names(parts))));
+            let message = format!("the rule for {} has no `ladder`", first.value);
+            reader.problem(first.mark, message, Some(format!("allowed: {}", names(parts))));
         }
         let ladder = known_ladder(changes.ladder, parts, reader);
         let actuator = known_ladder(changes.actuator, parts, reader);
-        if let (Some(trigger), Some(ladder)) = (trigger, ladder) {
-            parts.rules.push(Rule { cause: cause.value, trigger, ladder, actuator });
+        for (cause, trigger) in seen {
+            if parts.rules.iter().any(|other| other.cause == cause.value) {
+                let message = format!("cause {} has two rules", cause.value);
+                let help =
+                    String::from("one rule for each; under `extends`, change it in `override`");
+                reader.problem(cause.mark, message, Some(help));
+                continue;
+            }
+            if let (Some(trigger), Some(ladder)) = (trigger, &ladder) {
+                let (ladder, actuator) = (ladder.clone(), actuator.clone());
+                parts.rules.push(Rule { cause: cause.value, trigger, ladder, actuator });
+            }
+        }
+    }
+}
+
+/// The causes of one rule, and how each is seen.
+fn seen_by(
+    entry: At<CauseEntry>,
+    changes: &RuleChanges,
+    reader: &mut Reader,
+) -> Vec<(At<Cause>, Option<Trigger>)> {
+    match entry.value {
+        CauseEntry::Cause(cause) => {
+            let at = At { value: cause, mark: entry.mark };
+            let trigger = trigger(at.clone(), changes, None, reader);
+            vec![(at, trigger)]
+        }
+        CauseEntry::Program(program, causes) => {
+            let marks = [
+                changes.fact.as_ref().map(|at| at.mark),
+                changes.when.as_ref().map(|at| at.mark),
+                changes.at_most.as_ref().map(|at| at.mark),
+                changes.at_least.as_ref().map(|at| at.mark),
+            ];
+            for mark in marks.into_iter().flatten() {
+                let help = String::from("allowed: for, clear, ladder, actuator");
+                reader.problem(mark, "a program says itself what holds", Some(help));
+            }
+            let condition = told(changes, None, reader);
+            let trigger = condition.map(|told| Trigger::Program(program, told));
+            causes.into_iter().map(|cause| (cause, trigger.clone())).collect()
         }
     }
 }

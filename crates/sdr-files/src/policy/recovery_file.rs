@@ -3,10 +3,13 @@
 use std::{num::NonZeroU8, time::Duration};
 
 use schemars::{Schema, SchemaGenerator, json_schema};
-use sdr_core::{fitness::Alone, recover::Cause, units::Permille};
-use sdr_recovery::{Backoff, Restart, Return, Rung};
+use sdr_core::{fitness::Alone, units::Permille};
+use sdr_recovery::{Backoff, Over, Restart, Return, Rung};
 
-use super::conditions::{ClearText, CpuOf, HoldTime, LevelText, Median};
+use super::{
+    cause_words::CauseEntry,
+    condition_words::{ClearText, CpuOf, HoldTime, LevelText},
+};
 use crate::{
     read::{At, Map, Read, Reader, choices, one_key, table},
     tree::{Body, Node},
@@ -43,7 +46,6 @@ macro_rules! rules {
                 cause: At<CauseEntry>,
                 $($(#[$meta])* $field: $type,)*
             }
-            later { when: "an expression in CEL", }
         }
 
         table! {
@@ -51,7 +53,6 @@ macro_rules! rules {
             pub(crate) struct RuleChanges {
                 $($(#[$meta])* $field: $type,)*
             }
-            later { when: "an expression in CEL", }
         }
 
         impl RuleTable {
@@ -71,11 +72,17 @@ rules! {
     at_least: Option<At<LevelText>>,
     /// For component.cpu: of its `limit` (default) or of one `core`.
     of: Option<At<CpuOf>>,
-    /// For links: median.
-    over: Option<At<Median>>,
-    /// How long it must last; default 0s.
+    /// For links: median (default), worst or best.
+    over: Option<At<Over>>,
+    /// Instead of a fact and a bar: an expression (a part of CEL) that is true or false.
+    when: Option<At<String>>,
+    /// How long it must last, default 0s; for hung: how long no sign of life came, such as
+    /// `5 periods` or `2s`.
     r#for: Option<At<HoldTime>>,
-    /// When it is over: `200MB for 5s`; default: as soon as the bar is not met.
+    /// For robot-gone: how long nothing was heard of it; default: as the mesh has it.
+    lost_after: Option<At<Duration>>,
+    /// When it is over: `200MB for 5s`, for expressions and programs `5s`; default: as soon
+    /// as the bar is not met.
     clear: Option<At<ClearText>>,
     /// The median of this window is judged; default 1s for rssi, else 0s.
     median_over: Option<At<Duration>>,
@@ -127,7 +134,7 @@ table! {
         tries: Option<At<NonZeroU8>>,
         /// Quiet time that counts as healed; default 10s.
         settle: Option<At<Duration>>,
-        /// Pause before each try, doubling: default 200ms..5s.
+        /// Pause before each try but the first, doubling: default 200ms..5s.
         backoff: Option<At<Backoff>>,
     }
 }
@@ -150,55 +157,6 @@ impl Read for RulesEntry {
     fn schema(generator: &mut SchemaGenerator) -> Schema {
         let list = Vec::<RuleTable>::schema(generator);
         json_schema!({ "anyOf": [{ "const": "only" }, list] })
-    }
-}
-
-/// All causes, in the order of Table III.
-pub(crate) const CAUSES: [Cause; 15] = [
-    Cause::MemoryShort,
-    Cause::ComponentCpuHigh,
-    Cause::Exited,
-    Cause::Hung,
-    Cause::Error,
-    Cause::HardwareLost,
-    Cause::AbnormalBehaviour,
-    Cause::EmergencyStop,
-    Cause::BatteryLow,
-    Cause::RobotCpuHigh,
-    Cause::RssiLow,
-    Cause::DelayHigh,
-    Cause::JitterHigh,
-    Cause::LossHigh,
-    Cause::RobotGone,
-];
-
-/// The cause called `word`; an unknown one is told at `mark`.
-pub(crate) fn cause_of(at: &At<String>, reader: &mut Reader) -> Option<Cause> {
-    let found = CAUSES.into_iter().find(|cause| cause.word() == at.value);
-    if found.is_none() {
-        reader.unknown(at.mark, "cause", &at.value, &CAUSES.map(Cause::word));
-    }
-    found
-}
-
-/// A cause of Table III.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct CauseEntry(pub(crate) Cause);
-
-impl Read for CauseEntry {
-    fn read(node: &Node, reader: &mut Reader) -> Option<Self> {
-        if let Body::Table(entries) = &node.body
-            && let Some((key, _)) = entries.iter().find(|(key, _)| key.word == "exec")
-        {
-            reader.later(key.mark, "exec", "conditions of your own");
-            return None;
-        }
-        let value = reader.text(node, &CAUSES.map(Cause::word).join(", "))?.to_owned();
-        cause_of(&At { value, mark: node.mark }, reader).map(Self)
-    }
-
-    fn schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": CAUSES.map(Cause::word) })
     }
 }
 

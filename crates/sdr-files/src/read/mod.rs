@@ -73,6 +73,30 @@ impl Reader {
         self.problem(mark, message, Some(String::from("take it out")));
     }
 
+    /// The place of `width` bytes at byte `at` of `text`, the value that stands at `mark`; where
+    /// that spans lines or was escaped, the whole value and words for the place within.
+    pub(crate) fn within(
+        &self,
+        mark: Mark,
+        text: &str,
+        (at, width): (usize, usize),
+    ) -> (Mark, String) {
+        let line = self.source.text().lines().nth(mark.line.saturating_sub(1) as usize);
+        let line = line.unwrap_or("");
+        let start = mark.column.saturating_sub(1) as usize;
+        let rest: String = line.chars().skip(start).collect();
+        let quote = usize::from(rest.starts_with(['"', '\'']));
+        let count = |bytes: usize| text.get(..bytes).map_or(0, |part| part.chars().count());
+        let before = count(at);
+        let width = count(at + width).saturating_sub(before).max(1);
+        if !rest.chars().skip(quote).collect::<String>().starts_with(text) {
+            return (mark, format!(" (character {})", before + 1));
+        }
+        let number = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+        let column = mark.column.saturating_add(number(quote + before));
+        (Mark { column, width: number(width), ..mark }, String::new())
+    }
+
     /// Takes over the problems of another file.
     pub(crate) fn adopt(&mut self, problems: Problems) {
         self.problems.extend(problems);
@@ -89,6 +113,11 @@ impl Reader {
 
     pub(crate) fn is_clean(&self) -> bool {
         self.problems.is_empty()
+    }
+
+    /// Whether something on this line was told: what follows from it needs no words of its own.
+    pub(crate) fn has_told(&self, line: u32) -> bool {
+        self.problems.iter().any(|problem| problem.line == line)
     }
 
     /// The text of `node`.

@@ -229,7 +229,7 @@ macro_rules! whole_numbers {
         }
     )*};
 }
-whole_numbers!(u8, u16, u32);
+whole_numbers!(i8, u8, u16, u32);
 
 /// The type of a function that makes a quantity of a word.
 type Parse<T> = fn(&str) -> Result<T, UnitError>;

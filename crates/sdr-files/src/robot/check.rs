@@ -5,15 +5,15 @@ use std::{path::PathBuf, time::Duration};
 use sdr_core::{
     id::{Name, NameError, RobotId},
     report::RolePreference,
-    spec::PortRef,
+    spec::{OnAgentDeath, PortRef},
     units::Bytes,
 };
 
 use super::{
     config::{
-        ApiConfig, CapacityConfig, ComponentsConfig, DeviceConfig, LogConfig, LogFormat,
-        LogsConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig, SensorsConfig,
-        StorageConfig, SystemPort,
+        ApiConfig, CapacityConfig, Cgroup, ComponentsConfig, DeviceConfig, LogConfig, LogFormat,
+        LogsConfig, RadioConfig, RecordingsConfig, RobotConfig, SensorsConfig, StorageConfig,
+        SystemPort,
     },
     file::{
         CapacityTable, ComponentsTable, Devices, LogTable, RadioMode, RadioTable, RecordingsEntry,
@@ -68,12 +68,17 @@ pub(super) fn checked(
 }
 
 fn components(table: Option<ComponentsTable>, places: &Places) -> ComponentsConfig {
-    let (path, on_agent_death) =
-        table.map_or((None, None), |table| (table.path, table.on_agent_death));
+    let (path, on_agent_death, cgroup) =
+        table.map_or((None, None, None), |table| (table.path, table.on_agent_death, table.cgroup));
     let path = path.map(|path| path.value).unwrap_or_default();
     ComponentsConfig {
         path: path.iter().map(|at| places.resolve(&at.value)).collect(),
         on_agent_death: on_agent_death.map_or(OnAgentDeath::Keep, |at| at.value),
+        cgroup: match cgroup.as_ref().map(|at| at.value.as_str()) {
+            None | Some("auto") => Cgroup::Auto,
+            Some("off") => Cgroup::Off,
+            Some(folder) => Cgroup::Below(places.resolve(folder)),
+        },
     }
 }
 

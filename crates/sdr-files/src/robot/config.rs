@@ -10,7 +10,7 @@ use std::{
 use sdr_core::{
     id::{Name, RobotId},
     report::RolePreference,
-    spec::PortRef,
+    spec::{OnAgentDeath, PortRef},
     units::{Bytes, Permille},
 };
 
@@ -123,18 +123,22 @@ pub struct SensorsConfig {
 pub struct ComponentsConfig {
     /// Folders with executables, in this order; empty means beside the agent.
     pub path: Vec<PathBuf>,
-    /// What becomes of components when the agent dies.
+    /// What becomes of components when the agent dies, unless their system says otherwise.
     pub on_agent_death: OnAgentDeath,
+    /// Where limits are enforced.
+    pub cgroup: Cgroup,
 }
 
-/// What becomes of components when the agent dies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OnAgentDeath {
-    /// They go on. A restarted agent of this version ends what its predecessor left and
-    /// starts it anew.
-    Keep,
-    /// They end with the agent.
-    Stop,
+/// Where limits of components are enforced.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Cgroup {
+    /// Beside the agent's own group, when that was delegated as a subgroup `agent`; else by
+    /// rlimits.
+    Auto,
+    /// Nowhere: by rlimits.
+    Off,
+    /// Below this folder of the cgroup v2 file system, which the agent's user may write.
+    Below(PathBuf),
 }
 
 /// ROS 2.

@@ -6,11 +6,12 @@ use schemars::{Schema, SchemaGenerator, json_schema};
 use sdr_core::{
     id::{Name, RobotId},
     report::RolePreference,
+    spec::OnAgentDeath,
     units::{Bytes, Permille},
 };
 
 use super::{
-    config::{LogFormat, OnAgentDeath},
+    config::LogFormat,
     mesh::Unsealed,
     sources::{BatteryEntry, PositionEntry, RssiEntry},
 };
@@ -132,6 +133,8 @@ table! {
         path: Option<At<Vec<At<String>>>>,
         /// What becomes of components when the agent dies; default keep.
         on_agent_death: Option<At<OnAgentDeath>>,
+        /// Where limits are enforced: auto (default), off, or a folder of cgroup v2.
+        cgroup: Option<At<String>>,
     }
     later {
         user: "components run as the agent's user; another user",

@@ -13,11 +13,12 @@ mod sources;
 use std::path::Path;
 
 pub use config::{
-    ApiConfig, CapacityConfig, ComponentsConfig, DeviceConfig, LogConfig, LogFormat, LogsConfig,
-    MeshConfig, OnAgentDeath, RadioConfig, RecordingsConfig, RobotConfig, RosConfig, Seal,
+    ApiConfig, CapacityConfig, Cgroup, ComponentsConfig, DeviceConfig, LogConfig, LogFormat,
+    LogsConfig, MeshConfig, RadioConfig, RecordingsConfig, RobotConfig, RosConfig, Seal,
     SensorsConfig, StorageConfig, SystemPort,
 };
 pub use places::Places;
+pub use sdr_core::spec::OnAgentDeath;
 pub use sources::{BatterySource, PositionSource, RssiSource};
 
 pub(crate) use file::RobotFile;

@@ -19,8 +19,9 @@ use super::{
         ComponentTable, DefaultsTable, NeedsTable, OnData, PlaceTable, Rate, StandbyTable,
         SystemFile,
     },
+    limits::limits,
     order::{check_names, check_start_order},
-    policies::policies,
+    policies::{OwnRules, policies},
 };
 use crate::{
     policy::Finder,
@@ -44,9 +45,10 @@ pub(super) fn checked(
     reader: &mut Reader,
 ) -> Option<LoadedSystem> {
     let system = file.system.0;
+    let At { value: Map(mut entries), mark } = file.components.0?;
+    let own = own_recovery(&mut entries);
     let (allocation, recovery) =
-        policies(file.allocation, file.recovery, (finder, system.as_ref()), reader);
-    let At { value: Map(entries), mark } = file.components.0?;
+        policies((file.allocation, file.recovery, own), (finder, system.as_ref()), reader);
     if entries.is_empty() {
         reader.problem(mark, "a system has at least one component", None);
     }
@@ -91,6 +93,15 @@ pub(super) fn checked(
         reader.problem(system.mark, error.to_string(), None);
     }
     Some(LoadedSystem { spec, places })
+}
+
+/// Rules that components have of their own, taken out of their tables.
+fn own_recovery(entries: &mut [(At<String>, Option<At<ComponentTable>>)]) -> Vec<OwnRules> {
+    let own = entries.iter_mut().filter_map(|(name, table)| {
+        let entry = table.as_mut()?.value.recovery.take()?;
+        Some((name.value.clone(), entry))
+    });
+    own.collect()
 }
 
 pub(super) fn check_size(value: &FleetValue, mark: Mark, what: &str, reader: &mut Reader) {
@@ -162,6 +173,7 @@ fn component(
         on_isolation.action = given.value.action;
         on_isolation.after = given.value.after.unwrap_or(ISOLATED_AFTER);
     }
+    let limits = table.limits.map(|table| limits(table, reader)).unwrap_or_default();
     let (parameters, parameter_marks) = parameters(table.parameters, reader);
     let list = |given: Option<At<Vec<At<Name>>>>| -> Vec<Name> {
         given.map(|list| list.value.into_iter().map(|at| at.value).collect()).unwrap_or_default()
@@ -186,6 +198,8 @@ fn component(
         on_isolation,
         standby,
         parameters,
+        on_agent_death: table.on_agent_death.map(|at| at.value),
+        limits,
     };
     Some((component, places))
 }

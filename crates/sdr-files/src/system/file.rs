@@ -5,10 +5,11 @@ use std::time::Duration;
 use schemars::{Schema, SchemaGenerator, json_schema};
 use sdr_core::{
     id::{Name, RobotId},
-    spec::{IsolationAction, Reliability, StandbyKind, StandbyWhere, Value},
+    spec::{IsolationAction, OnAgentDeath, Reliability, StandbyKind, StandbyWhere, Value},
     units::{Bytes, Permille},
 };
 
+use super::limits::LimitsTable;
 use crate::{
     policy::{AllocationFile, PolicyEntry, RecoveryFile},
     problem::Mark,
@@ -83,12 +84,16 @@ table! {
         standby: Option<StandbyTable>,
         /// What it does when its robot hears nobody.
         on_isolation: Option<At<IsolationEntry>>,
+        /// Rules of its own in trouble: changes to those of the system, or the name of a policy.
+        recovery: Option<At<PolicyEntry<RecoveryFile>>>,
+        /// What becomes of it when its agent dies; default: as robot.toml has it.
+        on_agent_death: Option<At<OnAgentDeath>>,
+        /// What its process may take.
+        limits: Option<LimitsTable>,
     }
     later {
-        limits: "hard limits",
         ports: "mapping ports to ROS 2 topics",
         ready: "waiting for foreign processes",
-        on_agent_death: "keeping or stopping single components; robot.toml has it for all",
     }
 }
 

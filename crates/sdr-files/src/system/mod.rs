@@ -4,6 +4,7 @@ mod check;
 mod circle;
 mod connections;
 mod file;
+mod limits;
 mod link;
 mod order;
 mod policies;

@@ -84,7 +84,7 @@ pub struct Fleet {
     pub struck: Vec<(Instant, String)>,
     probe: Option<Box<dyn Probe>>,
     /// What all brains hold in common, once.
-    pool: Arc<Pool>,
+    pub(crate) pool: Arc<Pool>,
     gone_after: Duration,
     steps: u64,
 }

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use sdr_core::{
     effect::InputWiring, id::ComponentKey, lifecycle::LifecycleState, order::Token, recover::Cause,
-    spec::Needs,
+    spec::ComponentSpec,
 };
 
 /// How processes of one component behave on one robot from now on.
@@ -38,8 +38,8 @@ pub struct Process {
     pub component: ComponentKey,
     /// Its component's number.
     pub(crate) number: usize,
-    /// What it takes.
-    pub(crate) needs: Needs,
+    /// What it was started with.
+    pub(crate) spec: ComponentSpec,
     /// Its execution thread does nothing any more.
     pub(crate) hung: bool,
     /// Its inputs, each with the number of the component that feeds it.

@@ -7,11 +7,13 @@ use sdr_core::{
     brain::{Brain, BrainConfig, Seams},
     effect::{Direction, Route},
     id::RobotId,
-    input::InstanceId,
+    input::{Finding, InstanceId},
     lifecycle::LifecycleState,
     mesh::Commons,
     order::Token,
+    recover::Recovery,
     report::{HostReport, RobotFacts, RolePreference, Usage},
+    spec::PolicyBytes,
     time::Instant,
     units::{Bytes, Permille},
 };
@@ -23,6 +25,9 @@ use super::{
     pool::Pool,
     process::{Behaviour, Process},
 };
+
+/// What makes the recovery of a policy; the error is for people.
+pub type MakeRecovery = fn(&PolicyBytes) -> Result<Box<dyn Recovery + Send>, String>;
 
 /// Memory that the agent itself takes.
 const AGENT_MEMORY: Bytes = Bytes::mega(12);
@@ -39,6 +44,10 @@ pub struct Robot {
     pub takes: Option<Usage>,
     /// How processes of a component (by name) behave here; as usual when absent.
     pub behaviours: BTreeMap<String, Behaviour>,
+    /// What its operator's programs answer; `None`: there are none.
+    pub says: Option<Vec<Finding>>,
+    /// What makes its recovery of a policy, from its next start on.
+    pub recovery: MakeRecovery,
     /// Starts of processes so far.
     pub launches: usize,
     pub(crate) number: usize,
@@ -77,6 +86,8 @@ impl Robot {
             facts,
             takes: None,
             behaviours: BTreeMap::new(),
+            says: None,
+            recovery: sdr_recovery::make,
             launches: 0,
             number,
             life: 0,
@@ -122,7 +133,7 @@ impl Robot {
         };
         let commons: Arc<dyn Commons> = commons.clone();
         let seams = Seams {
-            recovery: Box::new(sdr_recovery::make),
+            recovery: Box::new(self.recovery),
             allocation: Box::new(sdr_alloc::check),
             commons: Some(commons),
         };
@@ -138,6 +149,15 @@ impl Robot {
         self.ins.clear();
         self.crash_at_store = None;
         std::mem::take(&mut self.processes)
+    }
+
+    /// Its agent is gone, and the routes between robots with it.
+    pub(crate) fn leave_processes(&mut self) {
+        self.brain = None;
+        self.life += 1;
+        self.outs.clear();
+        self.ins.clear();
+        self.crash_at_store = None;
     }
 
     /// Whether its agent runs.
@@ -228,7 +248,7 @@ impl Robot {
 
     /// What one of its processes takes.
     pub(crate) fn usage(&self, process: &Process) -> Usage {
-        let declared = Usage { memory: process.needs.memory, cpu: process.needs.cpu };
+        let declared = Usage { memory: process.spec.needs.memory, cpu: process.spec.needs.cpu };
         self.takes.unwrap_or(declared)
     }
 

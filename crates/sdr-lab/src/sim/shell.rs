@@ -46,11 +46,16 @@ impl Fleet {
                     let result = sdr_alloc::allocate(&problem);
                     self.later(number, SOON, Input::Planned { plan, result });
                 }
+                Effect::Ask(order) => {
+                    let says = self.robots[number].says.clone();
+                    let result = says.ok_or_else(|| String::from("there is no such program"));
+                    self.later(number, SOON, Input::Told { question: order.question, result });
+                }
                 Effect::Answer { result, .. } => {
                     let answer = match result {
                         Ok(Accepted::System(answer)) => Ok(answer),
                         // of the role: no system is promised by it
-                        Ok(Accepted::Role(_)) => continue,
+                        Ok(Accepted::Role(_) | Accepted::Reset(_)) => continue,
                         Err(error) => Err(error),
                     };
                     if self.setup.keeps_events {
@@ -144,7 +149,7 @@ impl Fleet {
         let process = Process {
             component: order.component,
             number: component,
-            needs: order.spec.needs,
+            spec: order.spec,
             hung: false,
             inputs,
             state: LifecycleState::Created,
@@ -172,6 +177,8 @@ impl Fleet {
     fn command(&mut self, robot: usize, instance: InstanceId, command: Command) {
         let turn = match command {
             Command::Activate(token) => Turn::Active(token),
+            // Processes here say themselves when they hang.
+            Command::Patience(_) => return,
             Command::Deactivate | Command::Reset => Turn::Idle,
             Command::Finish => Turn::Exit("exit status 0"),
             Command::Kill => Turn::Exit("killed by signal 9"),

@@ -6,8 +6,8 @@ use sdr_core::{
     id::Name,
     recover::Cause,
     spec::{
-        ComponentSpec, ConnectionSpec, Execution, Isolation, IsolationAction, Launch, Needs, Place,
-        PolicyBytes, PortRef, Qos, Standby, SystemSpec,
+        ComponentSpec, ConnectionSpec, Execution, Isolation, IsolationAction, Launch, Limits,
+        Needs, Place, PolicyBytes, PortRef, Qos, Standby, SystemSpec,
     },
     units::{Bytes, Permille},
 };
@@ -38,6 +38,8 @@ pub fn component(name: Name, executable: &str, needs: Needs) -> ComponentSpec {
         },
         standby: Standby::default(),
         parameters: Vec::new(),
+        on_agent_death: None,
+        limits: Limits::default(),
     }
 }
 

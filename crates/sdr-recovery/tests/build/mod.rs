@@ -7,7 +7,9 @@ use std::time::Duration;
 
 use sdr_core::{
     id::{ComponentKey, Name},
-    recover::{Cause, Evidence, Fault, Recovery, Remedy, RemedyOutcome, RobotEvidence, Verdict},
+    recover::{
+        Cause, Evidence, Fault, Recovery, Remedy, RemedyOutcome, RobotEvidence, Spread, Verdict,
+    },
     time::Instant,
     units::{Bytes, Dbm, Permille},
 };
@@ -39,14 +41,17 @@ pub(crate) fn evidence(word: &str) -> Evidence {
         memory: Bytes::mega(530),
         cpu: Permille(200),
         cpu_limit: Permille(200),
+        deadlines_missed: 0,
+        inputs_late: 0,
+        told: vec![],
         robot: RobotEvidence {
             memory_free: Some(Bytes::mega(840)),
             cpu: Some(Permille(300)),
             battery: Some(Permille(800)),
             rssi: Some(Dbm::from_tenths(-470)),
-            delay: Some(Duration::from_millis(5)),
-            jitter: Some(Duration::from_millis(2)),
-            loss: Some(Permille(0)),
+            delay: Some(Spread::of_one(Duration::from_millis(5))),
+            jitter: Some(Spread::of_one(Duration::from_millis(2))),
+            loss: Some(Spread::of_one(Permille(0))),
         },
     }
 }
@@ -82,6 +87,7 @@ pub(crate) fn restart_only(limits: Limits) -> Policy {
         ladders: vec![("up".into(), ladder)],
         rules: vec![Rule::on_fault(Cause::Exited, "up")],
         limits,
+        exceptions: vec![],
     })
     .expect("a policy")
 }

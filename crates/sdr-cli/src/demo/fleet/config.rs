@@ -107,7 +107,7 @@ recordings = {{ ports = ["exploration.position.odometry", "exploration.anomaly.d
 }
 
 /// A path as a TOML string.
-fn quoted(path: &Path) -> String {
+pub(crate) fn quoted(path: &Path) -> String {
     let mut text = String::from("\"");
     for character in path.to_string_lossy().chars() {
         match character {

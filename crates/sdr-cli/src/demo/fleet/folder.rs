@@ -33,16 +33,16 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
-    /// Makes it.
-    pub(crate) fn new() -> Result<Self, Failure> {
+    /// Makes it; its name begins with `prefix`.
+    pub(crate) fn new(prefix: &str) -> Result<Self, Failure> {
         let parent = std::env::temp_dir();
-        let long = parent.as_os_str().len() + "/sdr-123456".len() > PATH_BYTES_MAX;
+        let long = parent.as_os_str().len() + "/123456".len() + prefix.len() > PATH_BYTES_MAX;
         let parent = if long { PathBuf::from("/tmp") } else { parent };
         remove_orphans(&parent);
         let tell = |error: io::Error| {
             Failure::new(format!("cannot make a folder in {}: {error}", parent.display()))
         };
-        let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(&parent).map_err(tell)?;
+        let folder = tempfile::Builder::new().prefix(prefix).tempdir_in(&parent).map_err(tell)?;
         let lock = hold(folder.path()).map_err(tell)?;
         Ok(Self { path: folder.path().to_owned(), folder: Some(folder), _lock: lock })
     }
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn it_goes_with_all_that_is_in_it() {
-        let folder = Folder::new().unwrap();
+        let folder = Folder::new("sdr-").unwrap();
         let path = folder.path().to_owned();
         fs::create_dir_all(path.join("w/robot-1")).unwrap();
         fs::write(path.join("w/robot-1/wireless"), "x").unwrap();
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn sockets_in_it_have_short_enough_names() {
-        let folder = Folder::new().unwrap();
+        let folder = Folder::new("sdr-").unwrap();
         let longest = folder.path().join("w/robot-3/fisheye.sock");
         assert!(longest.as_os_str().len() <= 107, "{}", longest.display());
         let longest = folder.path().join("3/a.components.sock");

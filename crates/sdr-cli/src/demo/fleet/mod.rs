@@ -19,6 +19,7 @@ use super::ROBOTS;
 use crate::{failure::Failure, locate};
 
 pub(crate) use agent::Agent;
+pub(crate) use config::quoted;
 use config::{Common, Places};
 pub(crate) use folder::Folder;
 

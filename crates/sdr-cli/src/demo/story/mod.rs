@@ -16,7 +16,9 @@ use sdr_core::{
 use sdr_lab::world::monotonic_ns;
 use serde::Deserialize;
 
-use self::state::{has_moved, is_up, progress};
+pub(crate) use self::state::is_up;
+
+use self::state::{has_moved, progress};
 use super::{
     Plan,
     board::{Board, Step},
@@ -50,7 +52,7 @@ const MOVED: [&str; 2] = ["fisheye", "anomaly"];
 
 /// Plays it.
 pub(super) async fn play(plan: &Plan, session: &Session) -> Result<ExitCode, Failure> {
-    let folder = Folder::new()?;
+    let folder = Folder::new("sdr-")?;
     let programs = system::executables(folder.path())?;
     locate::all(programs.iter().map(String::as_str))?;
     let world = folder.path().join("w");
@@ -268,6 +270,7 @@ impl Story<'_> {
             detector: self.plan.images.is_none().then(|| self.stage.detector(until_ns)),
             pictures: self.plan.images.as_ref().map(|images| images.sentence()),
             danger_topic: Some(format!("/{}/anomaly/danger", spec.name)),
+            lab: None,
         }
     }
 

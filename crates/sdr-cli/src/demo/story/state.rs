@@ -14,7 +14,7 @@ pub(super) fn progress(system: Option<&SystemView>) -> String {
     format!("{active} of {components} active, {heard} of {connections} connections heard")
 }
 
-pub(super) fn is_up(system: &SystemView) -> bool {
+pub(crate) fn is_up(system: &SystemView) -> bool {
     system.components.iter().all(is_active) && system.connections.iter().all(|one| one.heard)
 }
 

@@ -1,6 +1,7 @@
 //! `report.html`: one file, nothing from outside, readable in light and in dark.
 
 mod decisions;
+mod lab;
 mod plots;
 mod structure;
 mod tables;
@@ -28,6 +29,7 @@ pub(crate) fn page(report: &Report) -> String {
     let _ = writeln!(html, "<h1>{}</h1>", escape(&title));
     let _ = writeln!(html, "<p class=\"muted\">{}</p>", escape(&subtitle(report)));
     html.push_str(&tables::headline(report));
+    html.push_str(&lab::scenario(report));
     html.push_str(&structure::before_and_after(report));
     html.push_str(&plots::robots(report));
     html.push_str(&decisions::allocation(report));

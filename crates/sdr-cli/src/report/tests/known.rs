@@ -60,5 +60,6 @@ pub(crate) fn extra() -> Extra {
             stop_after_ms: Some(420.0),
             ..Detector::default()
         }),
+        lab: None,
     }
 }

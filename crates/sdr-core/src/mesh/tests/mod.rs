@@ -148,6 +148,7 @@ impl Bench {
             | Report::Instance(_)
             | Report::Condition(_)
             | Report::Succession(_)
+            | Report::Hold(_)
             | Report::Homeless(_) => None,
         })
     }

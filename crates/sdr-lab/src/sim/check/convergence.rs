@@ -116,7 +116,7 @@ fn latest_edition(fleet: &Fleet, on: &[usize]) -> Option<String> {
             else {
                 continue;
             };
-            if spec.needs != process.needs {
+            if spec.needs != process.spec.needs {
                 return Some(format!("{key} runs an old edition on robot-{}", robot + 1));
             }
         }
