@@ -241,7 +241,7 @@ pub(crate) mod tests {
         let camera = Device { name: name("camera"), file: Some(file.clone()) };
         let wheels = Device { name: name("wheels"), file: None };
         let (sender, mut inputs) = mpsc::channel(4);
-        let facts = RobotFacts { devices: present(&[wheels.clone()]), ..facts() };
+        let facts = RobotFacts { devices: present(std::slice::from_ref(&wheels)), ..facts() };
         let installed = Installed::new((vec![], vec![camera, wheels]), facts, sender);
         let mut told = || {
             let input = inputs.try_recv().ok()?;

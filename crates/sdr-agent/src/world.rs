@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{FlockOperation, flock};
 use sdr_component::protocol::SharedMemory;
 use sdr_core::{
-    brain::{Brain, Seams},
+    brain::{Brain, BrainConfig, Seams},
     effect::StoredState,
     id::RobotId,
     input::Input,
@@ -130,6 +130,16 @@ fn seams() -> Seams {
     }
 }
 
+/// What is installed here, and which parts of the body are there.
+fn look_around(
+    robot: &RobotConfig,
+    brain: &BrainConfig,
+    inputs: &mpsc::Sender<Input>,
+) -> Installed {
+    let looked_at = (config::component_path(robot), config::devices(robot));
+    Installed::new(looked_at, brain.facts.clone(), inputs.clone())
+}
+
 impl World {
     /// Makes everything. Call within a `LocalSet`; who ends the agent by the API tells `ending`.
     pub(crate) async fn start(
@@ -152,9 +162,7 @@ impl World {
         let fleet = keys.as_ref().map(|keys| keys.identity().fleet());
         let mut brain_config = config::brain(robot, fleet);
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
-        let facts = brain_config.facts.clone();
-        let looked_at = (config::component_path(robot), config::devices(robot));
-        let installed = Installed::new(looked_at, facts, sender.clone());
+        let installed = look_around(robot, &brain_config, &sender);
         let brain = Brain::new(brain_config, seams(), ground.stored, clock::now());
 
         let outlets = Outlets {
@@ -164,10 +172,8 @@ impl World {
             trouble: trouble.clone(),
             types: PortTypes::default(),
         };
-        let supervisor_config = config::supervisor(robot);
-        let logs = supervisor_config.logs.clone();
         let (supervisor, adopted) =
-            Supervisor::start(supervisor_config, outlets.clone(), ground.survivors)
+            Supervisor::start(config::supervisor(robot), outlets.clone(), ground.survivors)
                 .map_err(because("components' socket"))?;
         let store = Store::start(state.clone(), sender.clone(), ground.events.clone())
             .map_err(because("store"))?;
@@ -183,7 +189,7 @@ impl World {
             trouble: trouble.clone(),
             plan: plan.clone(),
             routes: data.ledger(),
-            logs,
+            logs: config::supervisor(robot).logs,
             installed: installed.clone(),
             recording: ground.recorder.as_ref().map(Recorder::flusher),
             profiles: Profiles::new(config::component_path(robot)),
@@ -194,8 +200,8 @@ impl World {
         let api = Api::start(robot.api.socket.clone(), listener, remote, api_state);
         installed.watch();
         let events = ground.events;
-        let programs = config::component_path(robot);
-        let programs = Programs::new(robot.name.clone(), programs, sender.clone());
+        let path = config::component_path(robot);
+        let programs = Programs::new(robot.name.clone(), path, sender.clone());
         let effects =
             Effects { mesh, store, supervisor, data, desk, events, plan, programs, inputs: sender };
         let world = Self {

@@ -268,7 +268,7 @@ fn words(time: Duration) -> String {
     let millis = time.as_millis();
     let (number, unit) = match millis {
         0..1000 => return format!("{millis} ms"),
-        _ if millis % 60_000 == 0 && millis >= 120_000 => {
+        _ if millis.is_multiple_of(60_000) && millis >= 120_000 => {
             return format!("{} min", millis / 60_000);
         }
         _ => (millis, "s"),

@@ -66,7 +66,7 @@
 //!     robot: RobotEvidence::default(),
 //! }]);
 //!
-//! assert_eq!(verdicts[0].remedy, Remedy::Restart { after: Duration::from_millis(200) });
+//! assert_eq!(verdicts[0].remedy, Remedy::Restart { after: Duration::ZERO });
 //! assert_eq!(verdicts[0].reason, "signal 9; restart 1 of 3");
 //! ```
 #![no_std]

@@ -39,11 +39,11 @@ fn a_quiet_settling_time_leads_back_to_the_bottom() {
     let mut scene = scene();
     keeps_failing(&mut scene, 2);
     let settled = scene.engine.next_deadline().expect("settling ends some time");
-    // The second restart was planned for 400 ms after it was ordered at 1 s.
-    assert_eq!(settled, at(11_400));
-    assert!(scene.sleep_until(11_400).is_empty());
+    // The second restart was planned for 200 ms after it was ordered at 1 s.
+    assert_eq!(settled, at(11_200));
+    assert!(scene.sleep_until(11_200).is_empty());
 
-    let verdicts = scene.fails(11_401, "camera", Cause::Exited);
+    let verdicts = scene.fails(11_201, "camera", Cause::Exited);
 
     assert_eq!(verdicts[0].reason, "because; restart 1 of 3");
     assert_eq!(scene.engine.standing().len(), 1);
@@ -70,7 +70,7 @@ fn an_order_that_is_never_answered_counts_as_failed_once_the_component_failed_ag
     let verdicts = scene.sleep_until(120_000);
 
     assert_eq!(verdicts[0].0, 31_000);
-    assert_eq!(verdicts[0].1.remedy, restart_after(400));
+    assert_eq!(verdicts[0].1.remedy, restart_after(200));
 }
 
 #[test]

@@ -56,22 +56,22 @@ fn a_killed_agents_components_go_on_and_are_adopted() {
 
 #[test]
 fn a_component_that_died_without_an_agent_is_started_again() {
-    let mut house = deployed(1);
-    let (camera, fisheye) = (
-        house.agents[0].component_pid("camera").unwrap(),
+    let mut house = deployed(3);
+    let (anomaly, fisheye) = (
+        house.agents[0].component_pid("anomaly").unwrap(),
         house.agents[0].component_pid("fisheye").unwrap(),
     );
 
     house.agents[0].kill();
-    kill(camera);
+    kill(anomaly);
     house.agents[0].start();
 
     house.wait("all of it runs", |house| house.is_running(0));
     assert!(is_running(fisheye));
     let unwatched = house.agents[0].events("ended-unwatched");
     assert_eq!(unwatched.len(), 1, "{}", house.story());
-    assert!(unwatched[0].event.reason.contains(&camera.to_string()));
-    assert_eq!(house.component("camera").unwrap().epoch, 1);
+    assert!(unwatched[0].event.reason.contains(&anomaly.to_string()));
+    assert_eq!(house.component("anomaly").unwrap().epoch, 1);
 }
 
 #[test]
@@ -99,10 +99,10 @@ fn an_adopted_home_that_was_moved_meanwhile_is_fenced_and_ends() {
 
 #[test]
 fn an_upgrade_in_place_keeps_the_process_and_its_components() {
-    let house = deployed(1);
+    let house = deployed(3);
     let agent = &house.agents[0];
     let pids: Vec<u32> =
-        ["camera", "fisheye"].iter().map(|name| agent.component_pid(name).unwrap()).collect();
+        ["anomaly", "fisheye"].iter().map(|name| agent.component_pid(name).unwrap()).collect();
     let started = agent.events("agent-started")[0].wall_ms;
 
     let hangup = Command::new("kill").args(["-HUP", &agent.pid().to_string()]).status().unwrap();
@@ -115,14 +115,14 @@ fn an_upgrade_in_place_keeps_the_process_and_its_components() {
     assert!(pids.iter().all(|pid| is_running(*pid)), "{}", house.story());
     kill(pids[0]);
     house.wait("how it ended is known: it stayed the agent's child", |house| {
-        let exited = events_of(house, 0, "exited", "camera");
+        let exited = events_of(house, 0, "exited", "anomaly");
         exited.first().is_some_and(|view| view.event.reason.contains("signal 9"))
     });
 }
 
 #[test]
 fn stop_ends_components_and_agent_and_what_was_decided_stays() {
-    let mut house = deployed(1);
+    let mut house = deployed(3);
     let names = ["fisheye", "anomaly", "camera", "controller", "position"];
     let pids: Vec<u32> =
         names.iter().filter_map(|name| house.agents[0].component_pid(name)).collect();

@@ -1,6 +1,7 @@
 //! DDS as the transport between robots: one participant a robot, raw CDR bodies.
 
 mod matching;
+mod qos;
 mod raw;
 
 use std::{
@@ -17,15 +18,14 @@ use bytes::Bytes;
 use futures_util::Stream;
 use rustdds::{
     DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusListener, GUID, Publisher,
-    QosPolicies, QosPolicyBuilder, RTPSEntity, SampleIdentity, SequenceNumber, StatusEvented,
-    Subscriber, Timestamp, TopicKind, WriteOptionsBuilder,
+    QosPolicyBuilder, RTPSEntity, SampleIdentity, SequenceNumber, StatusEvented, Subscriber,
+    Timestamp, TopicKind, WriteOptionsBuilder,
     dds::{WriteError, no_key::DeserializedCacheChange},
     no_key::{DataWriter, SimpleDataReader},
-    policy::{Durability, History, Reliability as DdsReliability, ResourceLimits},
 };
-use sdr_core::spec::{Qos, Reliability};
 
 use matching::Matching;
+use qos::{policies, writer_policies};
 use raw::{CopyInto, Raw};
 
 use super::{
@@ -40,10 +40,6 @@ const DOMAIN_PORTS: u16 = 250;
 const SAMPLES_PORT: u16 = 7401;
 /// Largest body that is surely not fragmented, on links with an MTU of 576 and more.
 const WHOLE_BYTES_MAX: usize = 440;
-/// Samples a reliable writer may have unacknowledged.
-const WINDOW: i32 = 4096;
-/// Samples a reader's cache may hold at least, so that a short delay of ours loses none.
-const CACHE_MIN: i32 = 16;
 /// Bytes a reliable writer may hold while some reader acknowledges nothing.
 const UNACKNOWLEDGED_BYTES_MAX: u64 = 32 << 20;
 
@@ -351,38 +347,6 @@ fn old_guid(endpoints: &BTreeMap<EndpointId, Endpoint>, endpoint: EndpointId) ->
         Some(Endpoint::Reader(reader)) => reader.guid(),
         None => GUID::GUID_UNKNOWN,
     }
-}
-
-/// What both ends of a topic say of it.
-fn policies(qos: Qos) -> QosPolicies {
-    let depth = i32::from(qos.depth.max(1));
-    let reliability = match qos.reliability {
-        // A full window is reported at once: the bridge must never wait.
-        Reliability::Reliable => {
-            DdsReliability::Reliable { max_blocking_time: rustdds::Duration::ZERO }
-        }
-        Reliability::BestEffort => DdsReliability::BestEffort,
-    };
-    QosPolicyBuilder::new()
-        .reliability(reliability)
-        .history(History::KeepLast { depth })
-        .durability(Durability::Volatile)
-        // Also the bound of the reading side's cache.
-        .resource_limits(limits(depth.max(CACHE_MIN)))
-        .build()
-}
-
-/// What a writer says in addition: a reliable one has a window of its own.
-fn writer_policies(qos: Qos) -> QosPolicies {
-    let own = match qos.reliability {
-        Reliability::Reliable => QosPolicyBuilder::new().resource_limits(limits(WINDOW)),
-        Reliability::BestEffort => QosPolicyBuilder::new(),
-    };
-    policies(qos).modify_by(&own.build())
-}
-
-fn limits(max_samples: i32) -> ResourceLimits {
-    ResourceLimits { max_samples, max_instances: 1, max_samples_per_instance: max_samples }
 }
 
 fn name(topic: &Topic) -> String {

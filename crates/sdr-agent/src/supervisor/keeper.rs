@@ -1,5 +1,7 @@
 //! One task a process: from its start to its end, which is told exactly once.
 
+mod bury;
+
 use std::collections::BTreeMap;
 use std::io;
 use std::rc::Rc;
@@ -19,11 +21,10 @@ use tokio::net::UnixStream;
 use tokio::sync::mpsc;
 
 use super::instance::{Life, Overdue};
-use super::pidfd::End;
 use super::process::Process;
 use super::{Shared, samples, socket};
+use crate::clock;
 use crate::trouble::Kind;
-use crate::{clock, limits};
 
 /// Orders kept for a component that has not greeted yet.
 const PENDING_MAX: usize = 16;
@@ -373,38 +374,6 @@ impl Keeper {
     fn kill(&mut self, now: Instant) {
         self.life.killed(now);
         self.process.signal(Signal::KILL);
-    }
-
-    /// Reaps the process and says how it ended.
-    async fn bury(mut self) {
-        let (end, reason) = self.process.reap().await;
-        let was_out_of_memory = self.was_out_of_memory(end, &reason);
-        if let Some(group) = &self.process.keepsake.cgroup {
-            limits::dissolve(group);
-        }
-        let instance = self.order.instance;
-        tracing::debug!(event = "ended", component = %self.order.component, instance, reason);
-        self.shared.kept.borrow_mut().remove(&instance);
-        self.shared.journal.remove(instance);
-        self.shared.outlets.watch.remove(instance, &self.shared.outlets.record);
-        let news = match was_out_of_memory {
-            true => InstanceNews::OutOfMemory { reason },
-            false => InstanceNews::Exited { reason },
-        };
-        self.shared.tell(instance, news).await;
-    }
-
-    /// Whether the kernel, or its limit, took the memory away that it wanted.
-    fn was_out_of_memory(&self, end: Option<End>, reason: &str) -> bool {
-        let group = self.process.keepsake.cgroup.as_deref();
-        let of_group = group.is_some_and(limits::was_out_of_memory);
-        // One that we ended ourselves says nothing.
-        let by_kernel =
-            end == Some(End::Signal(9)) && !self.life.is_ending() && self.shared.oom.is_fresh();
-        let refused = self.order.spec.limits.memory.is_some()
-            && end != Some(End::Status(0))
-            && limits::says_refused(reason);
-        of_group || by_kernel || refused
     }
 }
 

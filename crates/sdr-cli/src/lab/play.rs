@@ -148,10 +148,11 @@ impl<'a> Play<'a> {
             let now = self.start.elapsed();
             while let Some(step) = steps.next_if(|step| step.at <= now) {
                 let text = deeds::words(&step.what);
-                match &step.what {
+                if matches!(step.what, Action::Expect(_)) {
                     // From the moment it is meant, not from when we got to it.
-                    Action::Expect(_) => self.judged.begin(step, start_ns + whole_ns(step.at)),
-                    _ => self.tell(text)?,
+                    self.judged.begin(step, start_ns + whole_ns(step.at));
+                } else {
+                    self.tell(text)?;
                 }
                 let did = self.hands.act(step.line, &step.what, &self.eyes);
                 let due = did.map_err(|failure| self.at_line(step.line, failure))?;

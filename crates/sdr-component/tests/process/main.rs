@@ -307,6 +307,7 @@ fn a_component_that_must_not_act_alone_deactivates_without_an_agent() {
     let (_process, mut line) = agent.prepare(None, ExecutionSetup::OnData);
     line.order(Order::Activate { token: token(1, 1) });
     line.until_state(LifecycleState::Active);
+    drop(line);
 
     // A busy machine may be late with its lease; it is never early.
     let mut states = (1..=100).map(|times| {

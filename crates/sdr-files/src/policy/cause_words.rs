@@ -108,14 +108,14 @@ fn program(table: ProgramTable, reader: &mut Reader) -> Option<CauseEntry> {
         Some(list) => list.value,
         None => vec![At { value: stem(&exec.value.0[0]), mark: exec.mark }],
     };
-    let own = |at: &At<String>, reader: &mut Reader| match cause_of(at, reader)? {
-        cause @ Cause::Own(_) => Some(At { value: cause, mark: at.mark }),
-        known => {
-            let message = format!("{known} is not found by a program");
-            let help = String::from("allowed: a name of your own");
-            reader.problem(at.mark, message, Some(help));
-            None
+    let own = |at: &At<String>, reader: &mut Reader| {
+        let cause = cause_of(at, reader)?;
+        if matches!(cause, Cause::Own(_)) {
+            return Some(At { value: cause, mark: at.mark });
         }
+        let message = format!("{cause} is not found by a program");
+        reader.problem(at.mark, message, Some(String::from("allowed: a name of your own")));
+        None
     };
     let causes: Vec<At<Cause>> = causes.iter().filter_map(|at| own(at, reader)).collect();
     let otherwise = otherwise.map_or(Otherwise::Ignore, |at| at.value);

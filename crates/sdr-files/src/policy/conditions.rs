@@ -261,15 +261,16 @@ fn refuse_condition(cause: Cause, changes: &RuleChanges, reader: &mut Reader) {
         changes.over.as_ref().map(|at| at.mark),
         changes.median_over.as_ref().map(|at| at.mark),
     ];
-    let (message, help) = match cause {
-        Cause::Own(_) => (
+    let (message, help) = if matches!(cause, Cause::Own(_)) {
+        (
             format!("{cause} without `fact` or `when` is reported by a component"),
             "ladder, actuator, or a fact with a bar, or `when`",
-        ),
-        cause => (
+        )
+    } else {
+        (
             format!("{cause} is reported as it happens, not measured over time"),
             "ladder, actuator; how often it happens is a cause of your own, such as `cause: crash-loop` with `fact: component.exits` and `at_least: 3 per 1min`",
-        ),
+        )
     };
     for mark in marks.into_iter().flatten() {
         reader.problem(mark, message.clone(), Some(format!("allowed: {help}")));

@@ -168,7 +168,7 @@ fn convert(kind: Kind, value: Answer<'_>) -> Option<Answer<'static>> {
         (Kind::Double, Answer::Int(number)) => Some(Answer::Double(number as f64)),
         (Kind::Int, Answer::Double(number)) => {
             let fits = (-9.2e18..9.2e18).contains(&number);
-            fits.then(|| Answer::Int(number as i64))
+            fits.then_some(Answer::Int(number as i64))
         }
         (Kind::Bool | Kind::Int | Kind::Double | Kind::Text | Kind::List, _) => None,
     }

@@ -3,7 +3,10 @@
 use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use sdr_core::{id::RobotId, spec::Reliability};
+use sdr_core::{
+    id::RobotId,
+    spec::{Qos, Reliability},
+};
 
 use super::*;
 use crate::data::{

@@ -1,7 +1,7 @@
 //! The component's side of the protocol, by hand.
 
 use std::env;
-use std::io::{Read as _, Write as _};
+use std::io::{self, Read as _, Write as _};
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
 
@@ -28,7 +28,7 @@ fn the_component_of_these_tests() {
     let stream = UnixStream::connect(&socket).unwrap();
     let now = report(LifecycleState::Created, None);
     let mut body = Body { stream, manner: String::new(), now };
-    body.greet();
+    body.greet().unwrap();
     let mut buffer = LineBuffer::default();
     let mut bytes = [0; 4096];
     loop {
@@ -75,9 +75,9 @@ struct Body {
 }
 
 impl Body {
-    fn greet(&mut self) {
+    fn greet(&mut self) -> io::Result<()> {
         let hello = hello(self.now.clone());
-        self.say(&FromComponent::Hello(Box::new(hello)));
+        self.stream.write_all(&encode_line(&FromComponent::Hello(Box::new(hello))).unwrap())
     }
 
     /// The agent is gone: some wait for the next one, and some do nothing any more.
@@ -92,16 +92,19 @@ impl Body {
         loop {
             if let Ok(stream) = UnixStream::connect(socket) {
                 self.stream = stream;
-                eprintln!("here I am again");
-                self.greet();
-                return true;
+                // The agent that is ending may still have taken it.
+                if self.greet().is_ok() {
+                    eprintln!("here I am again");
+                    return true;
+                }
             }
             std::thread::yield_now();
         }
     }
 
+    /// To an agent that may die meanwhile: the next reading finds out.
     fn say(&mut self, message: &FromComponent) {
-        self.stream.write_all(&encode_line(message).unwrap()).unwrap();
+        let _ = self.stream.write_all(&encode_line(message).unwrap());
     }
 
     fn hear(&mut self, message: ToComponent) {
