@@ -169,7 +169,7 @@ impl fmt::Display for Cause {
     }
 }
 
-/// In text a word; in postcard a number, and behind [`OWN_CODE`] a name.
+/// In text a word; in postcard a number, and behind 127 a name.
 impl Serialize for Cause {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         if serializer.is_human_readable() {
