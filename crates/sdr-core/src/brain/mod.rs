@@ -16,6 +16,7 @@ mod config;
 mod deadlines;
 mod decide;
 mod devices;
+mod editions;
 mod effects;
 mod epochs;
 mod evidence;
@@ -75,6 +76,7 @@ use crate::{
     report::{ConditionReport, HostReport},
     time::{Duration, Instant},
 };
+use editions::Editions;
 use epochs::EpochBook;
 use guard::GuardDesk;
 use hold::Holds;
@@ -154,6 +156,8 @@ pub struct Brain {
     spare_plans: BTreeMap<ComponentKey, SparePlan>,
     epochs: BTreeMap<ComponentKey, EpochBook>,
     guard: GuardDesk,
+    /// When this robot listed standbys of a component, not long ago.
+    listed: BTreeMap<ComponentKey, Instant>,
     /// Components that wish for a standby on another robot, and why none takes it.
     unbacked: BTreeMap<ComponentKey, alloc::vec::Vec<Refusal>>,
 
@@ -165,6 +169,7 @@ pub struct Brain {
     /// Homes that others chose lately: until when they have time to speak.
     homes_told: BTreeMap<ComponentKey, Instant>,
     desk: Desk,
+    editions: Editions,
     desk_of_role: RoleDesk,
     lease: Lease,
     holds: Holds,
@@ -231,6 +236,7 @@ impl Brain {
             spare_plans: BTreeMap::new(),
             epochs: epochs.collect(),
             guard: GuardDesk::default(),
+            listed: BTreeMap::new(),
             unbacked: BTreeMap::new(),
             told: ToldDesk::default(),
             lost: LostDesk::default(),
@@ -239,6 +245,7 @@ impl Brain {
             left: BTreeMap::new(),
             homes_told: BTreeMap::new(),
             desk: Desk::default(),
+            editions: Editions::default(),
             desk_of_role: RoleDesk::default(),
             lease: Lease::default(),
             holds: Holds::default(),
