@@ -5,6 +5,7 @@ mod again;
 mod deployment;
 mod own_recovery;
 mod policies;
+mod power;
 mod recovery;
 mod role;
 mod rules;
