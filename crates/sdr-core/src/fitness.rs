@@ -255,18 +255,21 @@ impl RolePolicy {
         self.pinned.iter().position(|pinned| pinned == robot).unwrap_or(self.pinned.len())
     }
 
-    /// Beats that may be missed on a link that loses `loss`: a false suspicion costs a
-    /// question, so one of ten thousand is rare enough.
+    /// Beats that may be missed on a way that loses `loss`: a false suspicion costs a few
+    /// questions, so five of ten thousand are rare enough.
     pub fn misses_at(&self, loss: Permille) -> u32 {
         misses_at(self.misses, loss)
     }
 }
 
-/// How many beats may be missed at this loss when `misses` may on a good link.
+/// How many beats may be missed at this loss when `misses` may on a good link: where half of
+/// all are lost and less, so many in a row are at most five of ten thousand.
 pub(crate) fn misses_at(misses: u32, loss: Permille) -> u32 {
     let needed = match loss.0 {
         0..150 => 4,
-        150..300 => 7,
+        150..200 => 5,
+        200..250 => 6,
+        250..300 => 7,
         300..500 => 12,
         _ => 18,
     };
@@ -338,7 +341,16 @@ mod tests {
     fn a_link_that_loses_more_is_given_more_time() {
         let policy = RolePolicy::default();
         let misses: Vec<u32> =
-            [0, 100, 200, 400, 900].map(|loss| policy.misses_at(Permille(loss))).into();
-        assert_eq!(misses, [4, 4, 7, 12, 16]);
+            [0, 100, 150, 200, 250, 400, 900].map(|loss| policy.misses_at(Permille(loss))).into();
+        assert_eq!(misses, [4, 4, 5, 6, 7, 12, 16]);
+    }
+
+    #[test]
+    fn so_many_beats_are_missed_in_a_row_five_times_of_ten_thousand() {
+        for loss in 1..500 {
+            let misses = misses_at(2, Permille(loss)).max(misses_at(4, Permille(loss)));
+            let rows = (0..misses).fold(1.0, |rows, _| rows * f64::from(loss) / 1000.0);
+            assert!(rows <= 5.1e-4, "{rows} at {loss}");
+        }
     }
 }

@@ -221,6 +221,7 @@ fn lines(figures: &Figures) -> Vec<String> {
             figures.virtual_s / figures.real_s.max(0.001)
         ),
         format!("false deaths       {}", figures.false_deaths),
+        format!("false take-overs   {}", figures.false_takeovers),
         format!("all running after  {}", number(figures.converged_ms, "ms")),
         format!("gone after a kill  {}", spread(&figures.detection_ms)),
         format!("quiet after a kill {}", spread(&figures.quiet_ms)),

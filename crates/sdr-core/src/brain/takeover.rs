@@ -15,11 +15,17 @@ use crate::{
     units::Permille,
 };
 
-/// Answers to a question are waited for so long.
+/// Answers to a question are waited for so long ...
 const ANSWERS_FOR: Duration = Duration::from_millis(250);
+/// ... or only so long, when all who were asked answered: time for three pings of the holder
+/// itself, of which it hears and answers one in all but seven of a thousand cases where each
+/// way loses a tenth.
+const PINGED_FOR: Duration = Duration::from_millis(150);
+/// Whoever could not take the role by then pings no more.
+const PINGS_END: Duration = Duration::from_secs(1);
 /// A question that nobody answered is asked again.
 const ASK_AGAIN: Duration = Duration::from_millis(400);
-/// While the holder is suspect it is looked at so often.
+/// While the holder is suspect it is looked at and pinged so often.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// The holder is silent for longer than usual.
@@ -27,6 +33,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 pub(super) struct Suspicion {
     holder: RobotId,
     since: Instant,
+    looked_at: Instant,
 }
 
 impl Brain {
@@ -64,7 +71,7 @@ impl Brain {
         }
         match self.succession() {
             Some(said) if said.order.contains(&self.me) => {
-                let loss = self.mesh.loss_to(holder).unwrap_or(Permille(0));
+                let loss = self.mesh.loss_from(holder).unwrap_or(Permille(0));
                 said.beat * self.role_policy().misses_at(loss)
             }
             Some(_) | None => quiet_after,
@@ -82,13 +89,23 @@ impl Brain {
         self.wake_for_role(now + LOOK_EVERY);
         let known = self.desk_of_role.suspicion.clone().filter(|known| known.holder == *holder);
         let Some(suspicion) = known else {
-            self.desk_of_role.suspicion = Some(Suspicion { holder: holder.clone(), since: now });
+            let fresh = Suspicion { holder: holder.clone(), since: now, looked_at: now };
+            self.desk_of_role.suspicion = Some(fresh);
             self.mesh.ask_about(now, holder);
+            self.mesh.ping(now, holder);
             return;
         };
-        let wait = self.role_policy().stagger * self.place_in_line();
+        if now < suspicion.looked_at + LOOK_EVERY {
+            return;
+        }
+        let turn = suspicion.since + self.role_policy().stagger * self.place_in_line();
+        let near = now + PINGED_FOR >= turn && now < turn + PINGS_END;
+        if near {
+            self.mesh.ping(now, holder);
+        }
+        self.desk_of_role.suspicion = Some(Suspicion { looked_at: now, ..suspicion });
         let hasty = planted::is(Defect::RoleTakenByAll);
-        let waits = now < suspicion.since + wait && !hasty;
+        let waits = now < turn && !hasty;
         if waits || !self.may_stand(now) || !(hasty || self.is_unheard(now, holder)) {
             return;
         }
@@ -112,11 +129,11 @@ impl Brain {
             return false;
         };
         let all = inquiry.answered >= inquiry.asked;
-        let waited = now.since(inquiry.asked_at) >= ANSWERS_FOR;
-        if inquiry.answered == 0 && now.since(inquiry.asked_at) >= ASK_AGAIN {
+        let waited = now.since(inquiry.asked_at);
+        if inquiry.answered == 0 && waited >= ASK_AGAIN {
             self.mesh.ask_about(now, holder);
         }
-        inquiry.answered > 0 && (all || waited)
+        inquiry.answered > 0 && waited >= if all { PINGED_FOR } else { ANSWERS_FOR }
     }
 
     /// How many are to try before this robot: as the holder named them, then by fitness.

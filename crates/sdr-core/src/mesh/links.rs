@@ -106,15 +106,15 @@ impl Links {
         self.links.get(&seat).map_or(Permille(1000), Link::noise)
     }
 
-    /// The loss of the link to one robot alone.
-    pub(super) fn loss(
+    /// The loss on the way from one robot alone.
+    pub(super) fn loss_in(
         &self,
         seat: Seat,
         now: Instant,
         silent_after: Duration,
     ) -> Option<Permille> {
         let link = self.links.get(&seat).filter(|link| link.came.is_some())?;
-        Some(link.loss(now, silent_after).0)
+        Some(link.loss(now, silent_after).2)
     }
 
     /// Robots that were heard.

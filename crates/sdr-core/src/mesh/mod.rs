@@ -255,6 +255,15 @@ impl Mesh {
         self.inquire(robot);
     }
 
+    /// Asks `robot` itself for a sign of life, when it is known where it is.
+    pub fn ping(&mut self, now: Instant, robot: &RobotId) {
+        self.clock = now;
+        let seat = self.authors.seat(robot).filter(|seat| *seat != Seat::OWN);
+        if let Some(address) = seat.and_then(|seat| self.peers.address(seat)) {
+            self.send(address, alloc::vec![Section::Ping]);
+        }
+    }
+
     /// The next datagram to send, at most [`DATAGRAM_BYTES_MAX`].
     pub fn poll_send(&mut self) -> Option<(SocketAddr, Vec<u8>)> {
         let (to, bytes) = self.outbox.pop_front()?;

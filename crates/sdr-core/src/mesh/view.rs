@@ -86,10 +86,10 @@ impl Mesh {
         self.links.report(seat, self.clock, self.silent_after())
     }
 
-    /// The loss of that link alone.
-    pub fn loss_to(&self, robot: &RobotId) -> Option<Permille> {
+    /// The loss on the way from `robot` to this one alone.
+    pub fn loss_from(&self, robot: &RobotId) -> Option<Permille> {
         let seat = self.authors.seat(robot)?;
-        self.links.loss(seat, self.clock, self.silent_after())
+        self.links.loss_in(seat, self.clock, self.silent_after())
     }
 
     /// A living robot that was not heard directly for so long cannot be heard.

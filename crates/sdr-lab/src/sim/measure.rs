@@ -11,6 +11,9 @@ use sdr_core::{
 
 use super::{Fleet, Record, Sight, check::convergence, same_table};
 
+/// A coordinator that nothing but chance silenced for so long was taken over falsely.
+const LATELY: Duration = Duration::from_secs(5);
+
 /// A robot that was killed on purpose.
 #[derive(Debug)]
 struct Kill {
@@ -79,6 +82,12 @@ impl Measure {
     fn told(&mut self, fleet: &Fleet, observer: usize, event: &Event) {
         match event.kind.as_str() {
             "robot-gone" => self.judged_gone(fleet, observer, event),
+            "role-taken" => {
+                let holder = named(fleet, observer, event);
+                let silent = event.reason.contains("is silent for");
+                let was_false = |holder| silent && spoke_lately(fleet, observer, holder);
+                self.record.false_takeovers += u64::from(holder.is_some_and(was_false));
+            }
             "condition-raised" | "hung" | "exited" | "error" | "held" => {
                 self.troubled.insert(observer, fleet.now);
             }
@@ -94,11 +103,7 @@ impl Measure {
     }
 
     fn judged_gone(&mut self, fleet: &Fleet, observer: usize, event: &Event) {
-        let words = event.reason.split(|c: char| !(c.is_alphanumeric() || c == '-'));
-        let named = words.filter_map(|word| RobotId::new(word).ok());
-        let target =
-            named.filter_map(|id| fleet.robot_number(&id)).find(|robot| *robot != observer);
-        let Some(target) = target else { return };
+        let Some(target) = named(fleet, observer, event) else { return };
         if let Some(kill) = self.kills.iter_mut().find(|kill| kill.robot == target) {
             if !std::mem::replace(&mut kill.gone[observer], true) {
                 self.record.detection_ms.push(ms(fleet.now.since(kill.at)));
@@ -182,6 +187,27 @@ impl Measure {
     pub(crate) fn lacking(fleet: &Fleet) -> Option<String> {
         convergence::lacking(fleet)
     }
+}
+
+/// The other robot that an event is about.
+fn named(fleet: &Fleet, observer: usize, event: &Event) -> Option<usize> {
+    let words = event.reason.split(|c: char| !(c.is_alphanumeric() || c == '-'));
+    let named = words.filter_map(|word| RobotId::new(word).ok());
+    named.filter_map(|id| fleet.robot_number(&id)).find(|robot| *robot != observer)
+}
+
+/// Whether a robot has been up, and nothing but chance kept the two from hearing each other,
+/// for a while.
+fn spoke_lately(fleet: &Fleet, observer: usize, holder: usize) -> bool {
+    let robot = &fleet.robots[holder];
+    let since = fleet.now - LATELY;
+    let heard =
+        |robot: usize| !fleet.was_deaf_since(robot, since) && !fleet.was_paused_since(robot, since);
+    robot.is_on()
+        && robot.on_since() <= since
+        && heard(holder)
+        && heard(observer)
+        && fleet.apart_for(observer, holder).is_none()
 }
 
 /// Whether a judgement "gone" was wrong: the robot was up for at least as long as silence must

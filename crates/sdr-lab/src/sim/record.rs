@@ -17,6 +17,8 @@ pub struct Record {
     pub robot_hours: f64,
     /// Judgements "gone" about a robot that was up and had been reachable.
     pub false_deaths: u64,
+    /// Takings of the coordinator role from a holder that was up and had been reachable.
+    pub false_takeovers: u64,
     /// From a kill to each observer's judgement "gone", ms.
     pub detection_ms: Vec<f64>,
     /// From a kill to each observer's judgement "quiet", ms.
@@ -78,6 +80,8 @@ pub struct Figures {
     pub real_s: f64,
     /// Judgements "gone" about a robot that was up and reachable.
     pub false_deaths: u64,
+    /// The role taken from a holder that was up and reachable.
+    pub false_takeovers: u64,
     /// Robots times hours on.
     pub robot_hours: f64,
     /// Kill to "gone", each observer.
@@ -119,6 +123,7 @@ impl Record {
         self.real_s += other.real_s;
         self.robot_hours += other.robot_hours;
         self.false_deaths += other.false_deaths;
+        self.false_takeovers += other.false_takeovers;
         self.detection_ms.extend(other.detection_ms);
         self.quiet_ms.extend(other.quiet_ms);
         self.known99_ms.extend(other.known99_ms);
@@ -144,6 +149,7 @@ impl Record {
             virtual_s: tenths(self.virtual_s, 1000.0),
             real_s: tenths(self.real_s, 1000.0),
             false_deaths: self.false_deaths,
+            false_takeovers: self.false_takeovers,
             robot_hours: tenths(self.robot_hours, 10_000.0),
             detection_ms: spread(&self.detection_ms),
             quiet_ms: spread(&self.quiet_ms),
