@@ -18,7 +18,7 @@ use crate::{id::RobotId, time::Instant};
 /// Fleets with fewer others greet two of them each round.
 const SMALL_FLEET: usize = 8;
 /// A round takes so much longer for each robot whose beat it carries.
-const ROUND_STRETCH: Duration = Duration::from_micros(600);
+const ROUND_STRETCH: Duration = Duration::from_micros(900);
 /// Fleets up to this size have ids of two bytes.
 const NARROW_FLEET: usize = 64;
 /// Robots in one datagram by name, when they are new: a quarter of those that wait.
