@@ -83,7 +83,12 @@ impl Brain {
             (true, false) => String::from("held it before"),
         };
         let event = Event::new("role-taken", &self.me, format!("term {term}, {why}"));
-        self.push_event(event.number("term", count(term)));
+        let mut event = event.number("term", count(term));
+        if let Some(since) = self.desk_of_role.suspected_at.take() {
+            let suspect = self.handled_at.since(since).as_millis();
+            event = event.number("suspect_ms", count(u64::try_from(suspect).unwrap_or(0)));
+        }
+        self.push_event(event);
     }
 
     /// It does not hold the role, or not any more.

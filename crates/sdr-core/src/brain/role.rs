@@ -21,6 +21,11 @@ const HEARD_WITHIN: Duration = Duration::from_millis(2500);
 
 /// A free role is looked at so often.
 const STAND_EVERY: Duration = Duration::from_millis(100);
+/// A role that nobody holds is not taken before this robot knows the same robots as others
+/// do, unless that takes longer than this since its start.
+const STAND_AT_LAST: Duration = Duration::from_secs(30);
+/// In larger fleets figures come by so slowly that each robot knows those of others.
+const COMPARED_MAX: usize = 64;
 /// Each robot sees the others' links otherwise than they do: when those before it in line do
 /// not take a free role, a robot does after so long for each of them.
 const STAND_STAGGER: Duration = Duration::from_secs(2);
@@ -36,6 +41,8 @@ pub(super) struct RoleDesk {
     pub(super) stood_at: Option<Instant>,
     /// Since when it could take a role that nobody holds.
     pub(super) free_since: Option<Instant>,
+    /// Since when its holder was suspect, when it is taken for that.
+    pub(super) suspected_at: Option<Instant>,
     /// Why this robot takes the role, until it is on disk and said.
     pub(super) why: String,
 }
@@ -77,18 +84,37 @@ impl Brain {
         }
         self.desk_of_role.stood_at = Some(now);
         self.wake_for_role(now + STAND_EVERY);
+        let latest = now.since(self.started_at) >= STAND_AT_LAST;
         if !self.may_stand(now) || !self.has_witness() {
             return;
         }
+        if !self.mesh.knows_the_same() && !latest && !planted::is(Defect::RoleTakenByAll) {
+            return;
+        }
         let since = *self.desk_of_role.free_since.get_or_insert(now);
-        if self.is_first_choice() || now >= since + STAND_STAGGER * self.place_in_line() {
+        if self.is_first_choice() || now >= since + STAND_STAGGER * self.place_to_stand() {
             let text = format!("fittest of {}", self.alive_robots().len());
             self.take_role(&text);
         }
     }
 
     fn is_first_choice(&self) -> bool {
-        self.candidates().first() == Some(&self.me) || planted::is(Defect::RoleTakenByAll)
+        self.place_to_stand() == 0 || planted::is(Defect::RoleTakenByAll)
+    }
+
+    /// How many are to take a role before this robot that nobody holds: the fitter ones, or
+    /// in a large fleet, where the others' figures are not known yet, those with smaller names.
+    /// A fitter one gets it from its holder later.
+    fn place_to_stand(&self) -> u32 {
+        if self.mesh.authors().count() <= COMPARED_MAX {
+            return self.place_in_line();
+        }
+        let rank = |robot: &RobotId| (!self.prefers(robot), self.role_policy().pin(robot));
+        let own = (rank(&self.me), &self.me);
+        let unfit = self.fitness(&self.me).unfit.is_some();
+        let others = self.mesh.alive().filter(|robot| self.may_hold(robot));
+        let before = others.filter(|robot| unfit || (rank(robot), *robot) < own);
+        u32::try_from(before.count()).unwrap_or(u32::MAX)
     }
 
     /// Takes the role under the next term.

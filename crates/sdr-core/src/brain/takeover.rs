@@ -109,6 +109,8 @@ impl Brain {
         if waits || !self.may_stand(now) || !(hasty || self.is_unheard(now, holder)) {
             return;
         }
+        let since = self.desk_of_role.suspicion.as_ref().map(|suspicion| suspicion.since);
+        self.desk_of_role.suspected_at = since;
         let text = format!("{holder} is silent for {} ms", silent.as_millis());
         self.take_role(&text);
     }
@@ -147,6 +149,6 @@ impl Brain {
                 named.len() + unnamed.position(|robot| *robot == self.me).unwrap_or(0)
             }
         };
-        u32::try_from(place).unwrap_or(u32::MAX).min(20)
+        u32::try_from(place).unwrap_or(u32::MAX)
     }
 }

@@ -217,7 +217,7 @@ impl AuthorTable {
                 self.index(author.id, seat);
                 self.seats.push(author);
                 self.names_hash ^= name_hash(robot);
-                self.order_by_name();
+                self.order_by_name(seat);
                 Admission::New(seat)
             }
         }
@@ -282,11 +282,15 @@ impl AuthorTable {
         self.seats[seat.0] = author;
     }
 
-    fn order_by_name(&mut self) {
-        self.seats_by_name = self.by_name.values().copied().collect();
-        self.places = Vec::from_iter(core::iter::repeat_n(0, self.seats.len()));
-        for (place, seat) in (0..).zip(&self.seats_by_name) {
-            self.places[seat.0] = place;
+    /// Puts the newest seat where its name belongs.
+    fn order_by_name(&mut self, seat: Seat) {
+        let robot = &self.seats[seat.0].robot;
+        let before = |other: &Seat| self.seats[other.0].robot < *robot;
+        let first = self.seats_by_name.partition_point(before);
+        self.seats_by_name.insert(first, seat);
+        self.places.push(0);
+        for (place, seat) in self.seats_by_name.iter().enumerate().skip(first) {
+            self.places[seat.0] = u16::try_from(place).unwrap_or(u16::MAX);
         }
     }
 

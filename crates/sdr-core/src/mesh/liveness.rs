@@ -19,8 +19,8 @@ const DOUBT_SHARE: (u32, u32) = (13, 100);
 const JUDGE_STEP: Duration = Duration::from_millis(50);
 /// Weight of the past in the usual gap, samples.
 const GAPS_KEPT: u64 = 1024;
-/// Quiet begins at most so many times later than configured.
-const STRETCH_MAX: u32 = 40;
+/// Quiet begins after so many times the age of the gone at the latest.
+const QUIET_MAX: u32 = 10;
 
 /// One observer's judgement of one robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -79,6 +79,12 @@ pub(super) struct Liveness {
     judge_at: Option<Instant>,
     heard_at: Instant,
     isolated: bool,
+    /// Others were heard lately that know other robots: news passes by ids until then.
+    by_ids_until: Instant,
+    by_ids: bool,
+    /// Worked out once for each size of the fleet: asked for with every sign of life.
+    passage: Duration,
+    quiet_base: Duration,
 }
 
 impl Liveness {
@@ -95,7 +101,21 @@ impl Liveness {
             judge_at: None,
             heard_at: now,
             isolated: false,
+            by_ids_until: now,
+            by_ids: false,
+            passage: Duration::ZERO,
+            quiet_base: gone_after * QUIET_SHARE.0 / QUIET_SHARE.1,
         }
+    }
+
+    /// Somebody was heard that knows other robots by name: fewer are told in one datagram,
+    /// and news takes longer. It does so until the last of it has passed.
+    pub(super) fn note_other_names(&mut self, now: Instant) {
+        if !self.by_ids {
+            self.by_ids = true;
+            self.refit();
+        }
+        self.by_ids_until = now + self.passage;
     }
 
     /// Makes a seat's robot unheard, be it new or another incarnation.
@@ -154,6 +174,7 @@ impl Liveness {
                 self.living += 1;
                 self.edition += 1;
                 self.wake_at(quiet_at, now);
+                self.refit();
                 Heard::Return
             }
             (Standing::Unheard | Standing::Gone, false) => {
@@ -176,6 +197,10 @@ impl Liveness {
 
     /// Robots whose standing falls at `now`.
     pub(super) fn judge(&mut self, now: Instant) -> Vec<(Seat, Standing)> {
+        if self.by_ids && now >= self.by_ids_until {
+            self.by_ids = false;
+            self.refit();
+        }
         if self.judge_at.is_none_or(|at| now < at) {
             return Vec::new();
         }
@@ -205,6 +230,9 @@ impl Liveness {
             next = Some(next.map_or(due, |next| next.min(due)));
         }
         self.judge_at = next.map(|at| at.max(now + JUDGE_STEP));
+        if !fallen.is_empty() {
+            self.refit();
+        }
         fallen
     }
 
@@ -287,17 +315,24 @@ impl Liveness {
     /// The age at which a robot is quiet: as configured, or longer where news usually takes
     /// longer, by what was measured and by how long news takes through a fleet of this size.
     pub(super) fn quiet(&self) -> Duration {
-        let usual = Duration::from_micros(self.gap_deviation * 9 / 2).max(self.passage());
-        let base = self.quiet_base();
-        usual.clamp(base, base * STRETCH_MAX)
+        let usual = Duration::from_micros(self.gap_deviation * 9 / 2).max(self.passage);
+        usual.max(self.quiet_base).min(self.gone_after * QUIET_MAX)
+    }
+
+    /// The size of the fleet changed, or how its news passes.
+    fn refit(&mut self) {
+        self.passage = self.passage();
     }
 
     /// Time in which nearly all news goes through the fleet: where each datagram tells of
     /// all, the rounds in which it doubles and half as many; else eight turns of the beats.
     fn passage(&self) -> Duration {
         let round = super::round::period(self.period, self.living);
-        let told = super::round::beats_in_round(self.living);
-        if told == self.living {
+        let told = match self.by_ids {
+            true => super::round::beats_by_id(self.living),
+            false => super::round::beats_in_round(self.living),
+        };
+        if told >= self.living {
             let doublings = usize::BITS - self.living.leading_zeros();
             return round * doublings * 3 / 2;
         }
@@ -308,11 +343,8 @@ impl Liveness {
     /// The age at which a robot is gone: later by half as much again as quiet is. In between
     /// it is asked directly.
     pub(super) fn gone(&self) -> Duration {
-        self.gone_after + (self.quiet() - self.quiet_base()) * 3 / 2
-    }
-
-    fn quiet_base(&self) -> Duration {
-        self.gone_after * QUIET_SHARE.0 / QUIET_SHARE.1
+        let stretched = self.quiet() - self.quiet_base;
+        self.gone_after + stretched + stretched / 2
     }
 
     fn deaf_after(&self) -> Duration {

@@ -264,6 +264,26 @@ impl Mesh {
         }
     }
 
+    /// All that this robot says of itself, for one who knows nothing of it: who it is, where,
+    /// and its records.
+    pub fn introduction(&self) -> Vec<Section> {
+        let stamp = self.stamp(Seat::OWN).into_iter();
+        let stamp = stamp.map(|stamp| Stamp { address: self.config.listen, ..stamp }).collect();
+        let mut sections = alloc::vec![Section::Stamps(stamp)];
+        let own = self.authors.at(Seat::OWN);
+        let mut since = 0;
+        while let Some(delta) = own.delta(since, wire::SECTION_BYTES_MAX) {
+            since = delta.sequence;
+            sections.push(Section::AuthorDelta(delta));
+        }
+        sections
+    }
+
+    /// Sections as datagrams of this robot; nothing is sent.
+    pub fn datagrams(&self, sections: &[Section]) -> Vec<Vec<u8>> {
+        self.header().pack(sections)
+    }
+
     /// The next datagram to send, at most [`DATAGRAM_BYTES_MAX`].
     pub fn poll_send(&mut self) -> Option<(SocketAddr, Vec<u8>)> {
         let (to, bytes) = self.outbox.pop_front()?;
@@ -334,9 +354,13 @@ impl Mesh {
 
     /// Gives the robot a seat under this incarnation.
     fn admit(&mut self, robot: &RobotId, incarnation: Incarnation) -> Admission {
+        let known = self.authors.count();
         let admission = self.authors.admit(robot, incarnation);
         match admission {
             Admission::New(seat) => {
+                if self.authors.count() > known {
+                    self.repair.note_newcomer();
+                }
                 self.liveness.reset(seat);
                 self.links.reset(seat);
                 self.told.introduce(seat);

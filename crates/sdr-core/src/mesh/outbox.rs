@@ -15,7 +15,7 @@ impl Mesh {
         u64::try_from(age).unwrap_or(u64::MAX).saturating_add(1)
     }
 
-    fn header(&self) -> Header {
+    pub(super) fn header(&self) -> Header {
         Header {
             fleet: self.config.fleet,
             from: self.config.robot.clone(),

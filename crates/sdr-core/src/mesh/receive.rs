@@ -93,7 +93,10 @@ impl Mesh {
             Section::Link(mark) => self.links.take(seat, mark, self.clock),
             // the header and the link's mark are the answer; who is new wants to compare, too
             Section::Ping => answer.push(self.summary()),
-            Section::Beats(beats) => self.take_beats(from, &beats),
+            Section::Beats(beats) => {
+                self.liveness.note_other_names(self.clock);
+                self.take_beats(from, &beats);
+            }
             Section::Summary(summary) => self.compare(from, summary, answer),
             Section::Pulse(pulse) => {
                 self.compare(from, pulse.summary, answer);
@@ -176,6 +179,7 @@ impl Mesh {
         let readable = pulse.names == self.authors.names_hash();
         self.repair.note_names(readable);
         if !readable {
+            self.liveness.note_other_names(self.clock);
             return;
         }
         let mut unknown = Vec::new();

@@ -80,6 +80,8 @@ pub(super) struct Repair {
     roster_doubts: u8,
     /// The last who spoke knows the same robots by name.
     names_agreed: bool,
+    /// Somebody did so since the last new one was met.
+    names_shared: bool,
     session: Option<Session>,
     unfinished: bool,
     changed_at: Option<Instant>,
@@ -109,8 +111,19 @@ impl Repair {
         self.names_agreed
     }
 
+    /// Whether somebody who knows the same robots was heard since the last new one was met.
+    pub(super) fn names_shared(&self) -> bool {
+        self.names_shared
+    }
+
     pub(super) fn note_names(&mut self, agree: bool) {
         self.names_agreed = agree;
+        self.names_shared |= agree;
+    }
+
+    /// A robot is met for the first time.
+    pub(super) fn note_newcomer(&mut self) {
+        self.names_shared = false;
     }
 
     pub(super) fn may_correct(&mut self, now: Instant) -> bool {
@@ -211,7 +224,7 @@ impl Mesh {
             answer.push(self.root_nodes());
         }
         if theirs.roster == self.authors.hash() {
-            self.repair.names_agreed = true;
+            self.repair.note_names(true);
             self.repair.roster_doubts = 0;
             return;
         }

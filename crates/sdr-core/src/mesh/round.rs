@@ -21,6 +21,8 @@ const SMALL_FLEET: usize = 8;
 const ROUND_STRETCH: Duration = Duration::from_micros(900);
 /// Fleets up to this size have ids of two bytes.
 const NARROW_FLEET: usize = 64;
+/// Beats in one datagram then: as many bytes as [`BEATS_BY_ID`] of the short ones.
+const BEATS_BY_WIDE_ID: usize = BEATS_BY_ID * beat_len(false) / beat_len(true);
 /// Robots in one datagram by name, when they are new: a quarter of those that wait.
 const INTRODUCED_MIN: usize = 3;
 const INTRODUCED_MAX: usize = 10;
@@ -137,6 +139,11 @@ pub(super) fn beats_in_round(others: usize) -> usize {
     if others <= FLEET_TOLD { others } else { BEATS_TOLD }
 }
 
+/// Beats in one datagram of such a fleet to a robot that may not know the same others.
+pub(super) fn beats_by_id(others: usize) -> usize {
+    if others < NARROW_FLEET { BEATS_BY_ID } else { BEATS_BY_WIDE_ID }
+}
+
 /// Time between two rounds in a fleet with so many others: the more one says, the less often.
 pub(super) fn period(shortest: Duration, others: usize) -> Duration {
     let beats = u32::try_from(others.min(FLEET_TOLD)).unwrap_or(0);
@@ -242,7 +249,7 @@ impl Mesh {
     /// Beats that name robots by id, for whoever may not know the same ones.
     fn beats_by_id(&mut self, to: Seat) -> Beats {
         let wide = self.authors.count() > NARROW_FLEET;
-        let room = if wide { BEATS_BY_ID * beat_len(false) / beat_len(true) } else { BEATS_BY_ID };
+        let room = beats_by_id(self.authors.count() - 1);
         let mut beats = Vec::new();
         for (seat, sign) in self.signs(to, room) {
             let id = cut(self.authors.at(seat).id, wide);
@@ -269,13 +276,15 @@ impl Mesh {
     /// Signs of life of all others, or of those that are fresh and were told least.
     fn signs(&mut self, to: Seat, room: usize) -> Vec<(Seat, Sign)> {
         let preferred = self.preferred();
+        let period = u64::try_from(self.config.period.as_nanos()).unwrap_or(u64::MAX);
         let mut ranked: Vec<(u64, Seat)> = Vec::with_capacity(self.liveness.living_count());
         for (seat, seen) in self.liveness.living() {
             if seat != to {
-                let age = self.clock.since(seen.fresh_at).as_micros();
-                let told = self.config.period.as_micros() * u128::from(seen.told);
-                let rank = if preferred.contains(&seat) { age / 4 } else { age + told };
-                ranked.push((u64::try_from(rank).unwrap_or(u64::MAX), seat));
+                let age = self.clock.as_nanos().saturating_sub(seen.fresh_at.as_nanos());
+                let told = period.saturating_mul(u64::from(seen.told));
+                let is_preferred = preferred.contains(&seat);
+                let rank = if is_preferred { age / 4 } else { age.saturating_add(told) };
+                ranked.push((rank, seat));
             }
         }
         if ranked.len() > room {

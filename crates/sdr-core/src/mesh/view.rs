@@ -31,6 +31,12 @@ impl Mesh {
         self.in_step
     }
 
+    /// Whether somebody who knows the same robots was heard since this one met its last new
+    /// one: whoever is there is known by now.
+    pub fn knows_the_same(&self) -> bool {
+        self.repair.names_shared()
+    }
+
     /// How long ago `robot` said the last that is known of it, by any path.
     pub fn age(&self, robot: &RobotId, now: Instant) -> Option<Duration> {
         match self.authors.seat(robot)? {

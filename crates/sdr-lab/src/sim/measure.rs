@@ -86,7 +86,10 @@ impl Measure {
                 let holder = named(fleet, observer, event);
                 let silent = event.reason.contains("is silent for");
                 let was_false = |holder| silent && spoke_lately(fleet, observer, holder);
-                self.record.false_takeovers += u64::from(holder.is_some_and(was_false));
+                let is_false = holder.is_some_and(was_false);
+                self.record.false_takeovers += u64::from(is_false);
+                let suspect = event.numbers.get("suspect_ms").filter(|_| !is_false);
+                self.record.takeover_ms.extend(suspect);
             }
             "condition-raised" | "hung" | "exited" | "error" | "held" => {
                 self.troubled.insert(observer, fleet.now);

@@ -27,6 +27,12 @@ pub struct Record {
     pub known99_ms: Vec<f64>,
     /// From the kill of a coordinator to the next one, ms.
     pub coordinator_gap_ms: Vec<f64>,
+    /// From the moment a silent coordinator is suspect until the next one acts, ms.
+    pub takeover_ms: Vec<f64>,
+    /// In each planned hand-over of the role, time in which neither end acted, ms.
+    pub handover_gap_ms: Vec<f64>,
+    /// In each planned hand-over of the role, time in which both ends acted, ms.
+    pub handover_overlap_ms: Vec<f64>,
     /// Bytes a second of each robot, converged and idle.
     pub bytes_per_robot_s: Vec<f64>,
     /// The same of guard beats.
@@ -92,6 +98,12 @@ pub struct Figures {
     pub known99_ms: Option<f64>,
     /// Kill of a coordinator to the next.
     pub coordinator_gap_ms: Spread,
+    /// A silent coordinator suspect until the next one acts.
+    pub takeover_ms: Spread,
+    /// Planned hand-overs: neither end acts.
+    pub handover_gap_ms: Spread,
+    /// Planned hand-overs: both ends act.
+    pub handover_overlap_ms: Spread,
     /// Converged and idle, headers and seal included, guard beats not.
     pub bytes_per_robot_s: Rate,
     /// Guard beats alone.
@@ -128,6 +140,9 @@ impl Record {
         self.quiet_ms.extend(other.quiet_ms);
         self.known99_ms.extend(other.known99_ms);
         self.coordinator_gap_ms.extend(other.coordinator_gap_ms);
+        self.takeover_ms.extend(other.takeover_ms);
+        self.handover_gap_ms.extend(other.handover_gap_ms);
+        self.handover_overlap_ms.extend(other.handover_overlap_ms);
         self.bytes_per_robot_s.extend(other.bytes_per_robot_s);
         self.guard_bytes_per_robot_s.extend(other.guard_bytes_per_robot_s);
         for (name, rates) in other.section_bytes_per_robot_s {
@@ -155,6 +170,9 @@ impl Record {
             quiet_ms: spread(&self.quiet_ms),
             known99_ms: greatest(&self.known99_ms),
             coordinator_gap_ms: spread(&self.coordinator_gap_ms),
+            takeover_ms: spread(&self.takeover_ms),
+            handover_gap_ms: spread(&self.handover_gap_ms),
+            handover_overlap_ms: spread(&self.handover_overlap_ms),
             bytes_per_robot_s: rate(&self.bytes_per_robot_s),
             guard_bytes_per_robot_s: rate(&self.guard_bytes_per_robot_s),
             section_bytes_per_robot_s: self.section_means(),

@@ -1,6 +1,7 @@
 //! The mesh of a few robots over a wire that loses, repeats and spoils.
 
 mod life;
+mod patience;
 mod spreading;
 mod wire;
 
