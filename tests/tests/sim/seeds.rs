@@ -68,6 +68,7 @@ fn a_plain_run_measures_what_it_promises() {
         outage: Duration::ZERO,
         stall: Duration::ZERO,
         kills: true,
+        converged: false,
         seed: 3,
     };
 

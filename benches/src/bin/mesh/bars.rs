@@ -19,6 +19,7 @@ fn plain(robots: usize, time: Duration) -> Plain {
         outage: Duration::ZERO,
         stall: Duration::ZERO,
         kills: true,
+        converged: false,
         seed: 0,
     }
 }

@@ -52,6 +52,9 @@ struct RunArgs {
     /// Kill no robots: detection, gaps and joins are not measured
     #[arg(long)]
     no_kills: bool,
+    /// Start with everybody known to everybody and everything running
+    #[arg(long, conflicts_with = "chaos")]
+    converged: bool,
     /// The seed draws everything: fleet, radio, faults, operators; only --seed, --seeds and
     /// --jobs count
     #[arg(long)]
@@ -206,6 +209,7 @@ fn plain(args: &RunArgs) -> Result<Plain, Failure> {
         outage: time("outage", args.outage, 60.0)?,
         stall: time("stall", args.stall, 300.0)?,
         kills: !args.no_kills,
+        converged: args.converged,
         seed: args.seed,
     })
 }
@@ -227,6 +231,9 @@ fn lines(figures: &Figures) -> Vec<String> {
         format!("quiet after a kill {}", spread(&figures.quiet_ms)),
         format!("known by 99 %      {}", number(figures.known99_ms, "ms")),
         format!("coordinator gap    {}", spread(&figures.coordinator_gap_ms)),
+        format!("  since suspect    {}", spread(&figures.takeover_ms)),
+        format!("hand-over, nobody  {}", spread(&figures.handover_gap_ms)),
+        format!("  both act         {}", spread(&figures.handover_overlap_ms)),
         format!("sent while idle    {}", rate(&figures.bytes_per_robot_s)),
         format!("  guard beats      {}", rate(&figures.guard_bytes_per_robot_s)),
         format!("join, empty disk   {}", number(figures.join_bytes, "B")),

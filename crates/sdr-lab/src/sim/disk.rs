@@ -99,6 +99,12 @@ impl Disk {
         *self = Self { is_read: self.is_read, ..Self::new() };
     }
 
+    /// Holds `state` from now on, as if it had been written long ago; what is being written
+    /// goes on.
+    pub(crate) fn hold(&mut self, state: Option<StoredState>) {
+        self.held = state;
+    }
+
     pub(crate) fn held(&self) -> Option<&StoredState> {
         self.held.as_ref()
     }

@@ -19,6 +19,7 @@ mod chance;
 mod chaos;
 pub mod check;
 mod clock;
+mod converged;
 mod disk;
 mod draw;
 mod due;

@@ -6,7 +6,9 @@
 
 use std::time::Duration;
 
-use sdr_core::{mesh::SECTION_NAMES, record::RecordKind, time::Instant};
+use sdr_core::{
+    fitness::RolePolicy, mesh::SECTION_NAMES, record::RecordKind, spec::SystemSpec, time::Instant,
+};
 
 use super::{
     Chance, Fault, Fleet, Incident, Record, Setup, Weather, fault::DiskFate, fleet::BEGIN,
@@ -27,6 +29,10 @@ const DOWN: Duration = Duration::from_secs(40);
 const BETWEEN_KILLS: Duration = Duration::from_secs(20);
 /// After a kill it is looked so often who is quiet.
 const QUIET_LOOKS: Duration = Duration::from_millis(50);
+/// In a hand-over it is looked so often who acts as coordinator ...
+const HAND_OVER_LOOKS: Duration = Duration::from_millis(1);
+/// ... for so long at most.
+const HANDED_OVER_MAX: Duration = Duration::from_secs(8);
 /// Markers measured in one run.
 const MARKERS: usize = 8;
 /// Time until the next marker.
@@ -49,6 +55,8 @@ pub struct Plain {
     pub stall: Duration,
     /// Whether robots are killed in the last part.
     pub kills: bool,
+    /// Whether all know each other and everything runs when time begins.
+    pub converged: bool,
     /// Draws who is killed and what is lost.
     pub seed: u64,
 }
@@ -57,9 +65,19 @@ impl Plain {
     /// Runs it.
     pub fn run(&self) -> Record {
         let mut chance = Chance::stream(self.seed, 3);
-        let mut run = Run::new(self.fleet(), self.seed);
-        let end = BEGIN + self.time;
-        self.come_up(&mut run, &mut chance);
+        let mut fleet = self.fleet();
+        let lacking = match self.converged {
+            true => fleet.start_converged(&self.systems(fleet.setup())).err(),
+            false => None,
+        };
+        let mut run = Run::new(fleet, self.seed);
+        let begin = run.fleet.now;
+        let end = begin + self.time;
+        match lacking {
+            Some(what) => run.note("not-converged", what),
+            None if self.converged => {}
+            None => self.come_up(&mut run, &mut chance),
+        }
         self.schedule_outages(&mut run.fleet, end);
         let left = end.since(run.fleet.now);
         let idle = if self.kills { left.mul_f64(0.4) } else { left.mul_f64(0.8) };
@@ -96,21 +114,7 @@ impl Plain {
             super::check::convergence::one_coordinator(fleet, &all).is_none()
         };
         let mut converged = run.advance_until(CONVERGED_MAX, pace, led);
-        let needs = systems::fitting(
-            self.robots,
-            self.components,
-            run.fleet.setup().memory,
-            run.fleet.setup().cpu,
-        );
-        let mut left = self.components;
-        for number in 0.. {
-            if left == 0 {
-                break;
-            }
-            let count = left.min(SYSTEM_COMPONENTS);
-            left -= count;
-            let mut system = systems::chain(systems::name("system", number), count, needs);
-            system.recovery = systems::patient();
+        for system in self.systems(run.fleet.setup()) {
             run.fleet.deploy(chance.below(self.robots), &system);
             run.advance(Duration::from_millis(20));
         }
@@ -122,6 +126,19 @@ impl Plain {
             let what = Measure::lacking(&run.fleet).unwrap_or_else(|| "late".into());
             run.note("not-converged", what);
         }
+    }
+
+    /// All components in systems of ten.
+    fn systems(&self, setup: &Setup) -> Vec<SystemSpec> {
+        let needs = systems::fitting(self.robots, self.components, setup.memory, setup.cpu);
+        let recovery = systems::patient();
+        let system = |first: usize| {
+            let count = (self.components - first).min(SYSTEM_COMPONENTS);
+            let name = systems::name("system", first / SYSTEM_COMPONENTS);
+            let chain = systems::chain(name, count, needs);
+            SystemSpec { recovery: recovery.clone(), ..chain }
+        };
+        (0..self.components).step_by(SYSTEM_COMPONENTS).map(system).collect()
     }
 
     fn schedule_outages(&self, fleet: &mut Fleet, end: Instant) {
@@ -243,9 +260,39 @@ fn kills(run: &mut Run, chance: &mut Chance, end: Instant) {
             run.measure.join(&run.fleet, robot);
         }
         run.fleet.switch_on(robot);
-        run.advance(BETWEEN_KILLS);
+        run.advance(BETWEEN_KILLS / 2);
+        hand_over(run, BETWEEN_KILLS / 2);
         number += 1;
     }
+}
+
+/// A policy forbids the role to its holder, which hands it over; it is looked often who acts.
+fn hand_over(run: &mut Run, time: Duration) {
+    let end = run.fleet.now + time;
+    let holder = run.fleet.highest_coordinator().filter(|robot| run.fleet.can_speak(*robot));
+    let term = |fleet: &Fleet, robot: usize| fleet.robots[robot].coordinator().map(|role| role.1);
+    if let Some(holder) = holder {
+        let before = term(&run.fleet, holder);
+        let forbidden = vec![run.fleet.robots[holder].id.clone()];
+        let policy = RolePolicy { forbidden, ..RolePolicy::default() };
+        run.fleet.set_role_policy(holder, &policy);
+        let (mut gap, mut overlap) = (Duration::ZERO, Duration::ZERO);
+        let over = run.advance_until(HANDED_OVER_MAX, HAND_OVER_LOOKS, |fleet| {
+            let acting = fleet.robots.iter().filter(|robot| robot.coordinates()).count();
+            match acting {
+                0 => gap += HAND_OVER_LOOKS,
+                1 => {}
+                _ => overlap += HAND_OVER_LOOKS,
+            }
+            // until the old holder knows the new one
+            acting == 1 && term(fleet, holder) > before
+        });
+        if over {
+            run.measure.record.handover_gap_ms.push(gap.as_secs_f64() * 1000.0);
+            run.measure.record.handover_overlap_ms.push(overlap.as_secs_f64() * 1000.0);
+        }
+    }
+    run.advance(end.since(run.fleet.now));
 }
 
 /// Lets time pass after a kill, and looks often: quiet is no event.

@@ -23,6 +23,7 @@ pub(crate) struct Run {
     real: RealInstant,
     on_s: f64,
     counted_at: Instant,
+    begun_at: Instant,
 }
 
 impl Run {
@@ -37,6 +38,7 @@ impl Run {
             look_period,
             looked_after: 0,
             counted_at: fleet.now,
+            begun_at: fleet.now,
             fleet,
             stops_early: false,
             watch: Watch::new(seed),
@@ -101,7 +103,7 @@ impl Run {
     pub(crate) fn finish(mut self) -> Record {
         self.count_hours();
         let mut record = self.measure.record;
-        record.virtual_s = self.fleet.age().as_secs_f64();
+        record.virtual_s = self.fleet.now.since(self.begun_at).as_secs_f64();
         record.real_s = self.real.elapsed().as_secs_f64();
         record.robot_hours = self.on_s / 3600.0;
         record.replans = self.fleet.tally.replans;

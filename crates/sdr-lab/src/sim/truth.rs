@@ -81,6 +81,12 @@ impl Fleet {
         deaf.chain(cuts.map(|cut| cut.since)).chain(off).chain(paused).min()
     }
 
+    /// Whether a robot is on and neither deaf nor standing still.
+    pub fn can_speak(&self, robot: usize) -> bool {
+        let paused = self.now < self.robots[robot].paused_until;
+        self.robots[robot].is_on() && !paused && self.air.deaf_since(robot, self.now).is_none()
+    }
+
     /// Whether a robot's agent stood still at any time since then.
     pub fn was_paused_since(&self, robot: usize, since: Instant) -> bool {
         self.robots[robot].paused_until > since

@@ -81,7 +81,8 @@ fn extra(fleet: &Fleet, holder: usize, other: usize) -> Option<String> {
     ))
 }
 
-fn each_once(fleet: &Fleet, on: &[usize]) -> Option<String> {
+/// Each wanted component is active once, at its home; nothing else is.
+pub(crate) fn each_once(fleet: &Fleet, on: &[usize]) -> Option<String> {
     let wanted = fleet.wanted(on);
     let table = fleet.table(*on.first()?)?;
     for key in &wanted {
