@@ -52,6 +52,13 @@ struct Entry {
     saying: Arc<Saying>,
 }
 
+impl Entry {
+    /// Bytes in a delta, at most.
+    fn wire_len(&self) -> usize {
+        self.saying.value().len() + self.saying.key().as_str().len() + 16
+    }
+}
+
 /// What came of a delta.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Learned {
@@ -284,17 +291,23 @@ impl Author {
     /// Records after `since`, oldest first, as many as fit `room` bytes; `None` when there
     /// are none or not one fits.
     pub(super) fn delta(&self, since: u64, room: usize) -> Option<AuthorDelta> {
-        if since >= self.sequence {
+        if since >= self.sequence || room <= DELTA_FRAME_BYTES {
             return None;
         }
-        let mut fresh: Vec<&Entry> =
-            self.entries.iter().filter(|entry| entry.sequence > since).collect();
+        let fresh = || self.entries.iter().filter(|entry| entry.sequence > since);
+        // a datagram is full for most of those that wait: nothing is collected for them
+        let oldest = fresh().min_by_key(|entry| entry.sequence);
+        if oldest.is_some_and(|oldest| DELTA_FRAME_BYTES + oldest.wire_len() > room) {
+            return None;
+        }
+        let mut fresh: Vec<&Entry> = fresh().collect();
         fresh.sort_unstable_by_key(|entry| entry.sequence);
-        let mut records: Vec<(u64, String, Vec<u8>)> = Vec::with_capacity(fresh.len());
+        let mut records: Vec<(u64, String, Vec<u8>)> = Vec::new();
         let mut used = DELTA_FRAME_BYTES;
         let mut reached = self.sequence;
-        for Entry { sequence, saying } in fresh {
-            used += saying.value().len() + saying.key().as_str().len() + 16;
+        for entry in fresh {
+            used += entry.wire_len();
+            let Entry { sequence, saying } = entry;
             if used > room {
                 reached = records.last().map(|(sequence, ..)| *sequence)?;
                 break;
