@@ -1,7 +1,7 @@
 //! What others reach, quoted: the paper, published defaults, and SWIM as simulated.
 
 /// One row's words about each of them; empty where it says nothing of it.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(crate) struct Peers {
     pub(crate) paper: &'static str,
     /// memberlist's defaults, simulated with foca beside this mesh, and tuned.
