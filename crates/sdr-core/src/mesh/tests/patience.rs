@@ -27,10 +27,14 @@ fn where_others_know_other_robots_news_is_given_more_time() {
 
     let during = (liveness.quiet(), liveness.gone());
     assert!(during.0 > before.0 * 2 && during.1 > before.1, "{during:?} after {before:?}");
-    assert_eq!(liveness.judge(now + before.0 + Duration::from_secs(1)), []);
+    let soon = now + before.0 + Duration::from_secs(1);
+    // somebody is heard: this robot is not deaf
+    liveness.hear_directly(Seat::at(1), soon);
+    assert_eq!(liveness.judge(soon), []);
 
     // what was said then has passed: as before
     let later = now + during.0;
+    liveness.hear_directly(Seat::at(1), later);
     let fallen = liveness.judge(later);
     assert_eq!((liveness.quiet(), liveness.gone()), before);
     assert!(fallen.iter().all(|(_, standing)| *standing == Standing::Quiet));
