@@ -80,8 +80,8 @@ pub(super) struct Repair {
     roster_doubts: u8,
     /// The last who spoke knows the same robots by name.
     names_agreed: bool,
-    /// Somebody did so since the last new one was met.
-    names_shared: bool,
+    /// Nobody did so since the last new one was met.
+    names_unshared: bool,
     session: Option<Session>,
     unfinished: bool,
     changed_at: Option<Instant>,
@@ -111,19 +111,20 @@ impl Repair {
         self.names_agreed
     }
 
-    /// Whether somebody who knows the same robots was heard since the last new one was met.
+    /// Whether somebody who knows the same robots was heard since the last new one was met;
+    /// always so of a robot that met none.
     pub(super) fn names_shared(&self) -> bool {
-        self.names_shared
+        !self.names_unshared
     }
 
     pub(super) fn note_names(&mut self, agree: bool) {
         self.names_agreed = agree;
-        self.names_shared |= agree;
+        self.names_unshared &= !agree;
     }
 
     /// A robot is met for the first time.
     pub(super) fn note_newcomer(&mut self) {
-        self.names_shared = false;
+        self.names_unshared = true;
     }
 
     pub(super) fn may_correct(&mut self, now: Instant) -> bool {
