@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs every check, and ends with 1 when any fails.   ./test.sh [STEP...]
-# Steps: format lints pure docs tests planted python. Without a name: all, in this order.
+# Steps: format lints pure docs tests planted fuzz python. Without a name: all, in this order.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 source .ci/missing.sh
@@ -11,6 +11,7 @@ venv=$target/venv
 format() {
     need_rust_part fmt rustfmt
     cargo fmt --all --check
+    cargo fmt --manifest-path fuzz/Cargo.toml --check
 }
 
 lints() {
@@ -49,6 +50,13 @@ planted() {
     cargo test --locked -p sdr-lab --features planted --test planted
 }
 
+# The fuzz targets go with the code; running them is fuzz/run.sh. Nothing is linked: the path
+# spares libFuzzer's build.
+fuzz() {
+    CUSTOM_LIBFUZZER_PATH=$target/libfuzzer.a CARGO_TARGET_DIR=$target/fuzz \
+        cargo check --locked --manifest-path fuzz/Cargo.toml
+}
+
 # Others can read what the agents write.
 python() {
     need_python
@@ -59,7 +67,7 @@ python() {
         "$venv/bin/python" -m pytest -p no:cacheprovider tests/python
 }
 
-steps=(format lints pure docs tests planted python)
+steps=(format lints pure docs tests planted fuzz python)
 if [ $# -gt 0 ]; then
     for step in "$@"; do
         [[ " ${steps[*]} " == *" $step "* ]] || fail "no step $step; there are: ${steps[*]}"

@@ -1,9 +1,6 @@
 //! What the brain must not forget, on disk: replaced as a whole, checked when read. The brain
-//! orders what changed; the writer holds the whole, whose facts are the brain's own.
-//!
-//! ```text
-//!  "SDRSTATE" | version u32 | checksum u64 of the rest | StoredState in postcard
-//! ```
+//! orders what changed; the writer holds the whole, whose facts are the brain's own. The bytes
+//! are those of [`sdr_core::disk`].
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -12,18 +9,14 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use sdr_core::{
+    disk::{self, StateError},
     effect::{StoredChange, StoredState},
     input::{Input, StoreTicket},
-    order::hash64,
 };
-use thiserror::Error;
 use tokio::sync::mpsc;
 
 use crate::events::Events;
 
-const MAGIC: &[u8; 8] = b"SDRSTATE";
-const VERSION: u32 = 1;
-const HEADER_BYTES: usize = 20;
 const FILE_NAME: &str = "state";
 
 /// What the disk held at the start.
@@ -40,34 +33,6 @@ pub(crate) enum Remembered {
         /// What is wrong with them.
         reason: StateError,
     },
-}
-
-/// Why bytes are not a state. Nothing was changed; the operator may look at the file.
-#[derive(Debug, Error)]
-pub(crate) enum StateError {
-    /// Not written by an agent.
-    #[error("{found} bytes that do not begin with the state's mark")]
-    Foreign {
-        /// Length of the file.
-        found: usize,
-    },
-    /// Written by another version.
-    #[error("version {found}; this agent reads version {VERSION}")]
-    Version {
-        /// The version it says.
-        found: u32,
-    },
-    /// Torn or flipped.
-    #[error("checksum {found:016x}, the content has {expected:016x}")]
-    Checksum {
-        /// The checksum it says.
-        found: u64,
-        /// The checksum of what is there.
-        expected: u64,
-    },
-    /// Whole, yet no state.
-    #[error("content cannot be read: {0}")]
-    Content(postcard::Error),
 }
 
 /// Writes states on a thread of its own; orders that wait are written together.
@@ -194,7 +159,7 @@ pub(crate) fn read(dir: &Path) -> io::Result<Remembered> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Remembered::Nothing),
         Err(error) => return Err(error),
     };
-    match decode(&bytes) {
+    match disk::decode(&bytes) {
         Ok(state) => Ok(Remembered::State(state)),
         Err(reason) => {
             let set_aside = free_name(dir);
@@ -218,36 +183,10 @@ fn free_name(dir: &Path) -> PathBuf {
 fn write(dir: &Path, state: &StoredState) -> io::Result<()> {
     let temporary = dir.join("state.new");
     let mut file = File::create(&temporary)?;
-    file.write_all(&encode(state).map_err(io::Error::other)?)?;
+    file.write_all(&disk::encode(state))?;
     file.sync_all()?;
     fs::rename(&temporary, dir.join(FILE_NAME))?;
     File::open(dir)?.sync_all()
-}
-
-fn encode(state: &StoredState) -> Result<Vec<u8>, postcard::Error> {
-    let content = postcard::to_allocvec(state)?;
-    let mut bytes = Vec::with_capacity(HEADER_BYTES + content.len());
-    bytes.extend_from_slice(MAGIC);
-    bytes.extend_from_slice(&VERSION.to_le_bytes());
-    bytes.extend_from_slice(&hash64(&content).to_le_bytes());
-    bytes.extend_from_slice(&content);
-    Ok(bytes)
-}
-
-fn decode(bytes: &[u8]) -> Result<StoredState, StateError> {
-    let foreign = StateError::Foreign { found: bytes.len() };
-    let Some(rest) = bytes.strip_prefix(MAGIC) else { return Err(foreign) };
-    let Some((version, rest)) = rest.split_first_chunk::<4>() else { return Err(foreign) };
-    let Some((checksum, content)) = rest.split_first_chunk::<8>() else { return Err(foreign) };
-    let version = u32::from_le_bytes(*version);
-    if version != VERSION {
-        return Err(StateError::Version { found: version });
-    }
-    let (found, expected) = (u64::from_le_bytes(*checksum), hash64(content));
-    if found != expected {
-        return Err(StateError::Checksum { found, expected });
-    }
-    postcard::from_bytes(content).map_err(StateError::Content)
 }
 
 #[cfg(test)]
@@ -256,10 +195,6 @@ mod tests {
 
     fn events() -> Events {
         Events::new(sdr_core::id::RobotId::new("robot-1").unwrap())
-    }
-
-    fn state(incarnation: u64) -> StoredState {
-        StoredState { incarnation, ..StoredState::default() }
     }
 
     /// What is new when the incarnation is: the first order holds everything.
@@ -296,7 +231,8 @@ mod tests {
     fn a_corrupt_state_is_set_aside_and_the_agent_starts_empty() {
         let dir = tempfile::tempdir().unwrap();
         for (number, spoil) in [(1, 25_usize), (2, 9), (3, 0)] {
-            let mut bytes = encode(&StoredState { incarnation: 300, ..state(0) }).unwrap();
+            let mut bytes =
+                disk::encode(&StoredState { incarnation: 300, ..StoredState::default() });
             let at = spoil.min(bytes.len() - 1);
             bytes[at] ^= 0x40;
             fs::write(dir.path().join(FILE_NAME), &bytes).unwrap();
@@ -307,14 +243,6 @@ mod tests {
             assert_eq!(set_aside, dir.path().join(format!("state.corrupt-{number}")));
             assert_eq!(fs::read(set_aside).unwrap(), bytes);
             assert!(matches!(read(dir.path()).unwrap(), Remembered::Nothing));
-        }
-    }
-
-    #[test]
-    fn every_truncation_is_seen() {
-        let bytes = encode(&StoredState { incarnation: 1 << 40, ..state(0) }).unwrap();
-        for length in 0..bytes.len() {
-            assert!(decode(&bytes[..length]).is_err(), "{length} of {} bytes", bytes.len());
         }
     }
 

@@ -47,6 +47,7 @@ pub mod fitness;
 pub mod recover;
 
 pub mod brain;
+pub mod disk;
 pub mod effect;
 pub mod input;
 

@@ -5,8 +5,17 @@ use std::path::Path;
 use super::tree::{Page, expect_none, pages, root};
 
 /// First words of paths that begin at the root.
-const TOP: [&str; 8] =
-    ["crates/", "components/", "tests/", "benches/", "docs/", "policies/", "systems/", ".ci/"];
+const TOP: [&str; 9] = [
+    "crates/",
+    "components/",
+    "tests/",
+    "benches/",
+    "docs/",
+    "policies/",
+    "systems/",
+    "fuzz/",
+    ".ci/",
+];
 
 /// What stands between single backticks; fenced blocks are left out.
 fn code_spans(text: &str) -> Vec<String> {

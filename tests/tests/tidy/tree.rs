@@ -8,7 +8,7 @@ use std::{
 use cargo_metadata::{Metadata, MetadataCommand};
 
 /// Folders that are made, not written.
-const MADE: [&str; 4] = ["target", ".git", ".venv", "__pycache__"];
+const MADE: [&str; 6] = ["target", ".git", ".venv", "__pycache__", "corpus", "artifacts"];
 
 /// One file of text.
 pub(super) struct Page {
