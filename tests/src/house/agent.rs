@@ -89,6 +89,20 @@ state = {state:?}
         fs::write(self.config(), text).expect("robot.toml is written");
     }
 
+    /// Replaces words of its robot.toml, which must be there once; for its next start.
+    pub fn rewrite(&self, old: &str, new: &str) {
+        let text = fs::read_to_string(self.config()).expect("it was written");
+        assert_eq!(text.matches(old).count(), 1, "`{old}` in\n{text}");
+        fs::write(self.config(), text.replace(old, new)).expect("it is written");
+    }
+
+    /// Another port for its mesh, from its next start on.
+    pub fn move_away(&mut self) {
+        let old = format!("listen = \"127.0.0.1:{}\"", self.port);
+        self.port = super::free_ports(1)[0];
+        self.rewrite(&old, &format!("listen = \"127.0.0.1:{}\"", self.port));
+    }
+
     /// Starts it; the operating system may still be busy with it when this returns.
     pub fn start(&mut self) {
         let log = fs::File::options().create(true).append(true).open(self.log());
@@ -106,12 +120,28 @@ state = {state:?}
         process.wait().expect("it is ours");
     }
 
+    /// Stops the agent alone in the middle of whatever it does, as a host that hangs would.
+    pub fn freeze(&self) {
+        self.signal(Signal::STOP);
+    }
+
+    /// Lets a frozen agent go on.
+    pub fn release(&self) {
+        self.signal(Signal::CONT);
+    }
+
+    fn signal(&self, signal: Signal) {
+        let process = self.process.as_ref().expect("the agent runs");
+        kill_process(Pid::from_child(process), signal).expect("the process is ours");
+    }
+
     /// Ends it in good order and waits for it.
     pub fn stop(&mut self) {
         let Some(mut process) = self.process.take() else { return };
         let pid = Pid::from_child(&process);
-        // it may have ended by itself
+        // it may have ended by itself, or be frozen
         let _ = kill_process(pid, Signal::TERM);
+        let _ = kill_process(pid, Signal::CONT);
         let ended = wait_for(LIMIT, || matches!(process.try_wait(), Ok(Some(_))));
         if !ended {
             let _ = process.kill();

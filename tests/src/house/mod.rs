@@ -24,9 +24,9 @@ pub use wait::wait_for;
 /// Longest wait for anything; only a broken fleet takes it.
 pub const LIMIT: Duration = Duration::from_secs(90);
 
-/// Three robots and their world.
+/// Some robots and their world.
 pub struct House {
-    /// By number, from 0: `robot-1`, `robot-2`, `robot-3`.
+    /// By number, from 0: `robot-1`, `robot-2`, ...
     pub agents: Vec<Agent>,
     /// The rovers, the tunnel, the radio.
     pub world: WorldHandle,
@@ -48,8 +48,11 @@ impl House {
     pub fn build(count: usize) -> Self {
         let programs = programs();
         let folder = tempfile::Builder::new().prefix("sdr").tempdir().expect("a folder");
-        let names: Vec<String> = (1..=3).map(|number| format!("robot-{number}")).collect();
-        let config = WorldConfig::convoy(folder.path(), "robot-2", &["robot-1", "robot-3"], 7);
+        let names: Vec<String> =
+            (1..=count.max(3)).map(|number| format!("robot-{number}")).collect();
+        let followers: Vec<&str> =
+            names.iter().map(String::as_str).filter(|name| *name != "robot-2").collect();
+        let config = WorldConfig::convoy(folder.path(), "robot-2", &followers, 7);
         let world = World::start(config).expect("the world starts");
         let (ports, domain) = (free_ports(count), free_domain());
         let mut agents: Vec<Agent> = Vec::new();
@@ -69,10 +72,8 @@ impl House {
 
     /// Gives an agent that was not started a seed that is none of the house.
     pub fn add_seed(&mut self, number: usize, port: u16) {
-        let file = self.agents[number].folder.join("robot.toml");
-        let text = std::fs::read_to_string(&file).expect("it was written");
         let seeds = format!("seeds = [\"127.0.0.1:{port}\", ");
-        std::fs::write(&file, text.replacen("seeds = [", &seeds, 1)).expect("it is written");
+        self.agents[number].rewrite("seeds = [", &seeds);
     }
 
     /// Whether that agent sees `count` living robots and a coordinator.

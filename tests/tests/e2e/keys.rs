@@ -106,7 +106,10 @@ fn a_fleet_changes_its_key_while_it_runs_and_the_revoked_robot_never_learns_it()
     house.wait("the revoked robot is refused and named", |house| {
         [0, 1].into_iter().any(|number| {
             let told = told(&house.agents[number]);
-            told.contains("stream: robot/robot-3 was revoked") && told.contains("was retired")
+            told.contains("stream: robot/robot-3 was revoked")
+                && told.contains("was retired")
+                && house.agents[number].bad_input("certificates_refused") > 0
+                && house.agents[number].bad_input("datagrams_retired_key") > 0
         })
     });
 }

@@ -1,7 +1,9 @@
 //! Real agents and real processes, as a user runs them.
 
+mod addresses;
 mod by_hand;
 mod demo;
+mod five;
 mod garbage;
 mod keys;
 mod lab;
@@ -9,3 +11,4 @@ mod life;
 mod limits;
 mod role;
 mod standby;
+mod strangers;

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use sdr_core::time::Instant;
+use sdr_core::{mesh::is_plain, time::Instant};
 use sdr_keys::seal::{Begin, Opened, Refusal};
 use tokio::net::UdpSocket;
 use tokio::sync::mpsc;
@@ -146,7 +146,7 @@ pub(super) fn send(socket: &UdpSocket, to: SocketAddr, bytes: &[u8]) {
 /// QUIC sets one of the two first bits of each packet (RFC 9000, 17.2 and 17.3); sealed
 /// datagrams set none, and plain ones of the mesh begin with `SD` and the version.
 fn is_of_a_stream(packet: &[u8]) -> bool {
-    packet.first().is_some_and(|first| first & 0xc0 != 0) && !packet.starts_with(b"SD\x01")
+    packet.first().is_some_and(|first| first & 0xc0 != 0) && !is_plain(packet)
 }
 
 /// Tells all robots that this one speaks with of each newer key, several times.

@@ -60,7 +60,7 @@ pub use saying::{AuthorKey, Saying, Spoken};
 pub use wire::{
     AskNews, AskStamps, AuthorDelta, Beat, Beats, DATAGRAM_BYTES_MAX, Datagram, Echo, FleetEntries,
     FleetNodes, Header, LinkMark, News, PlacedBeat, Pulse, RosterPiece, SEAL_BYTES_MAX,
-    SECTION_NAMES, Section, Sign, Stamp, Summary, WireError,
+    SECTION_NAMES, Section, Sign, Stamp, Summary, WireError, is_plain,
 };
 
 use crate::{id::RobotId, order::hash64, report::Report, rng::Rng, time::Instant, units::Permille};

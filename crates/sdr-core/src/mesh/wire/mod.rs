@@ -202,6 +202,11 @@ impl Datagram {
     }
 }
 
+/// Whether bytes begin as a plain datagram of some version does.
+pub fn is_plain(bytes: &[u8]) -> bool {
+    bytes.strip_prefix(&MAGIC).and_then(<[u8]>::first).is_some_and(|version| *version <= 16)
+}
+
 /// Writes 7 bits a byte, lowest first.
 fn put_varint(value: u64, bytes: &mut Vec<u8>) {
     let mut rest = value;
