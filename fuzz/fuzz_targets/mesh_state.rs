@@ -24,6 +24,7 @@ fn new_mesh() -> Mesh {
         robot: fleet::robot(0),
         fleet: fleet::number(),
         seeds: (1..fleet::ROBOTS).map(fleet::address).collect(),
+        group: None,
         listen: Some(fleet::address(0)),
         period: Duration::from_millis(350),
         gone_after: Duration::from_millis(11_500),

@@ -50,6 +50,11 @@ pub(crate) fn devices(config: &RobotConfig) -> Vec<Device> {
     config.devices.iter().map(device).collect()
 }
 
+/// The fleet's name; `of_keys` is the one that keys name.
+pub(crate) fn fleet(config: &RobotConfig, of_keys: Option<&str>) -> String {
+    of_keys.or(config.mesh.fleet.as_deref()).unwrap_or("fleet").into()
+}
+
 /// The brain's, but for where the mesh listens; `fleet` is the one that keys name.
 pub(crate) fn brain(config: &RobotConfig, fleet: Option<&str>) -> BrainConfig {
     let facts = RobotFacts {
@@ -63,7 +68,7 @@ pub(crate) fn brain(config: &RobotConfig, fleet: Option<&str>) -> BrainConfig {
         version: env!("CARGO_PKG_VERSION").into(),
     };
     BrainConfig {
-        fleet: fleet.or(config.mesh.fleet.as_deref()).unwrap_or("fleet").into(),
+        fleet: self::fleet(config, fleet),
         seeds: config.mesh.seeds.clone(),
         seed: OsRng.try_next_u64().expect("the kernel always has randomness after boot"),
         gossip_period: config.mesh.gossip_period,

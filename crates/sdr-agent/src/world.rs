@@ -23,6 +23,7 @@ use crate::effects::Effects;
 use crate::events::Events;
 use crate::installed::Installed;
 use crate::mesh::{
+    discovery::Discovery,
     keys::{FleetKeys, KeysRefused},
     sealed::Sidings,
     udp::Mesh,
@@ -161,6 +162,7 @@ impl World {
         let (mesh, streams) = start_mesh(robot, keys.clone(), sender.clone(), &trouble).await?;
         let fleet = keys.as_ref().map(|keys| keys.identity().fleet());
         let mut brain_config = config::brain(robot, fleet);
+        brain_config.group = mesh.group();
         brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
         let installed = look_around(robot, &brain_config, &sender);
         let brain = Brain::new(brain_config, seams(), ground.stored, clock::now());
@@ -258,10 +260,13 @@ async fn start_mesh(
     trouble: &Trouble,
 ) -> Result<(Mesh, Option<Streams>), StartError> {
     let address = robot.mesh.listen;
+    let fleet = config::fleet(robot, keys.as_ref().map(|keys| keys.identity().fleet()));
+    let wanted = robot.mesh.discovery.clone();
+    let discovery = wanted.map(|interfaces| Discovery::new(&fleet, interfaces));
     let socket = Mesh::open(address).await;
     let socket = socket.map_err(|source| StartError::Mesh { address, source })?;
     let Some(keys) = keys else {
-        return Ok((Mesh::start(socket, None, inputs, trouble.clone()), None));
+        return Ok((Mesh::start(socket, None, discovery, inputs, trouble.clone()), None));
     };
     let (stream_sender, packets) = mpsc::channel(PACKETS_MAX);
     let (hint_sender, hints) = mpsc::channel(HINTS_MAX);
@@ -269,7 +274,7 @@ async fn start_mesh(
     let streams = Streams::start(socket.clone(), packets, keys.clone(), store)?;
     streams.follow_hints(hints);
     let sidings = Sidings { streams: stream_sender, hints: hint_sender };
-    let mesh = Mesh::start(socket, Some((keys, sidings)), inputs, trouble.clone());
+    let mesh = Mesh::start(socket, Some((keys, sidings)), discovery, inputs, trouble.clone());
     Ok((mesh, Some(streams)))
 }
 

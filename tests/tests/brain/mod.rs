@@ -3,6 +3,7 @@
 mod adoption;
 mod again;
 mod deployment;
+mod group;
 mod own_recovery;
 mod policies;
 mod recovery;

@@ -19,7 +19,8 @@ fn unreadable() -> PolicyBytes {
     PolicyBytes { name: "of-tomorrow".into(), bytes: vec![0xff, 1, 2, 3] }
 }
 
-fn seams() -> Seams {
+/// What the agent fills in.
+pub(super) fn seams() -> Seams {
     Seams {
         recovery: Box::new(sdr_recovery::make),
         allocation: Box::new(sdr_alloc::check),

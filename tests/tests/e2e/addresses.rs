@@ -1,4 +1,4 @@
-//! Where robots are: remembered, and found again when they moved.
+//! Where robots are: found without seeds, remembered, and found again when they moved.
 
 use sdr_tests::house::{Agent, House};
 
@@ -9,6 +9,36 @@ fn without_seeds(house: &House, numbers: impl IntoIterator<Item = usize>) {
         let seeds = text.lines().find(|line| line.starts_with("seeds = ")).unwrap();
         house.agents[number].rewrite(seeds, "seeds = []");
     }
+}
+
+#[test]
+fn robots_without_seeds_find_each_other_on_the_local_network() {
+    let mut house = House::build(3);
+    without_seeds(&house, 0..3);
+    for agent in &house.agents {
+        agent.rewrite("seeds = []", "seeds = []\ndiscovery = true");
+    }
+
+    house.agents.iter_mut().for_each(Agent::start);
+
+    house.wait("all see all", |house| (0..3).all(|number| house.sees(number, 3)));
+}
+
+#[test]
+fn who_does_not_look_and_has_no_seeds_stays_alone() {
+    let mut house = House::build(2);
+    without_seeds(&house, 0..2);
+    house.agents[0].rewrite("seeds = []", "seeds = []\ndiscovery = true");
+
+    house.agents.iter_mut().for_each(Agent::start);
+    house.wait("both run", |house| (0..2).all(|number| house.status(number).is_some()));
+    // The one that looks has spoken to the group for some time.
+    house.wait("one looks", |house| {
+        house.agents[0].health()["mesh"]["sent"].as_u64().unwrap_or(0) >= 8
+    });
+
+    assert!((0..2).all(|number| house.status(number).unwrap().robots.len() == 1));
+    assert_eq!(house.agents[1].health()["mesh"]["received"], 0);
 }
 
 #[test]

@@ -76,6 +76,7 @@ impl Fleet {
             robot: name(number),
             fleet: 7,
             seeds,
+            group: None,
             listen: Some(address(number)),
             period: Duration::from_millis(350),
             gone_after: Duration::from_millis(11_500),

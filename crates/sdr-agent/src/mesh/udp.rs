@@ -1,7 +1,9 @@
 //! One UDP socket for all datagrams of the mesh, and for the packets of streams.
 
+use std::borrow::Cow;
 use std::io;
 use std::net::SocketAddr;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use sdr_core::input::Input;
@@ -10,6 +12,7 @@ use tokio::net::UdpSocket;
 use tokio::sync::mpsc;
 
 use super::addresses::Addresses;
+use super::discovery::Discovery;
 use super::keys::FleetKeys;
 use super::sealed::{self, Sidings, Sorter};
 use crate::clock;
@@ -26,6 +29,8 @@ const PACKET_BYTES_MAX: usize = 1500;
 pub(crate) struct Mesh {
     socket: Arc<UdpSocket>,
     keys: Option<(FleetKeys, Addresses)>,
+    /// `None` when nobody is looked for.
+    discovery: Option<Discovery>,
 }
 
 impl Mesh {
@@ -34,20 +39,33 @@ impl Mesh {
         UdpSocket::bind(address).await.map(Arc::new)
     }
 
-    /// Hands every datagram in: opened with the keys, or plain when there are none. Call
-    /// within a `LocalSet`.
+    /// Hands every datagram in, those of the group that `discovery` names too: opened with the
+    /// keys, or plain when there are none. Call within a `LocalSet`.
     pub(crate) fn start(
         socket: Arc<UdpSocket>,
         keys: Option<(FleetKeys, Sidings)>,
+        discovery: Option<Discovery>,
         inputs: mpsc::Sender<Input>,
         trouble: Trouble,
     ) -> Self {
         let sorter = keys
             .map(|(keys, sidings)| Sorter::start(keys, socket.clone(), sidings, trouble.clone()));
         let own = sorter.as_ref().map(|sorter| (sorter.keys.clone(), sorter.addresses.clone()));
-        let ear = Ear { socket: socket.clone(), sorter, inputs, trouble };
-        tokio::task::spawn_local(ear.listen());
-        Self { socket, keys: own }
+        let sorter = sorter.map(Rc::new);
+        let group = discovery.as_ref().and_then(|discovery| match discovery.listen() {
+            Ok(group) => Some(group),
+            // Seeds and those who find this robot are left.
+            Err(error) => {
+                tracing::error!(event = "group-unheard", %error, next = "go on without");
+                None
+            }
+        });
+        for socket in group.into_iter().chain([socket.clone()]) {
+            let (sorter, inputs) = (sorter.clone(), inputs.clone());
+            let ear = Ear { socket, sorter, inputs, trouble: trouble.clone() };
+            tokio::task::spawn_local(ear.listen());
+        }
+        Self { socket, keys: own, discovery }
     }
 
     /// Where others reach this robot.
@@ -55,17 +73,28 @@ impl Mesh {
         self.socket.local_addr()
     }
 
+    /// Where all robots on the local network are reached, when others are looked for.
+    pub(crate) fn group(&self) -> Option<SocketAddr> {
+        self.discovery.as_ref().map(Discovery::seed)
+    }
+
     /// Sends once, without waiting: gossip repairs what a full socket buffer drops.
     pub(crate) fn send(&self, to: SocketAddr, bytes: &[u8]) {
         assert!(bytes.len() <= DATAGRAM_BYTES_MAX, "the brain bounds its datagrams");
-        match &self.keys {
+        let group = self.discovery.as_ref().filter(|discovery| discovery.is_group(to));
+        let datagram = match &self.keys {
             Some((keys, addresses)) => {
                 let now = clock::now();
-                addresses.note(now, to);
-                let datagram = keys.seal().seal(now, bytes);
-                sealed::send(&self.socket, to, &datagram);
+                if group.is_none() {
+                    addresses.note(now, to);
+                }
+                Cow::Owned(keys.seal().seal(now, bytes))
             }
-            None => sealed::send(&self.socket, to, bytes),
+            None => Cow::Borrowed(bytes),
+        };
+        match group {
+            Some(group) => group.send(&self.socket, &datagram),
+            None => sealed::send(&self.socket, to, &datagram),
         }
     }
 }
@@ -74,7 +103,7 @@ impl Mesh {
 struct Ear {
     socket: Arc<UdpSocket>,
     /// `None` when datagrams are plain.
-    sorter: Option<Sorter>,
+    sorter: Option<Rc<Sorter>>,
     inputs: mpsc::Sender<Input>,
     trouble: Trouble,
 }

@@ -24,6 +24,9 @@ pub struct BrainConfig {
     pub facts: RobotFacts,
     /// Where other robots listen: seeds from robot.toml.
     pub seeds: Vec<SocketAddr>,
+    /// Where whoever is on the local network listens, when others are looked for; unlike a
+    /// seed it does not say that there are others.
+    pub group: Option<SocketAddr>,
     /// Where others reach this robot, when it knows.
     pub listen: Option<SocketAddr>,
     /// From the operating system's randomness: incarnation nonce and seed.
@@ -51,6 +54,7 @@ impl BrainConfig {
             fleet: String::from("fleet"),
             facts,
             seeds: Vec::new(),
+            group: None,
             listen: None,
             seed: 0,
             gossip_period: Duration::from_millis(350),
@@ -70,15 +74,19 @@ impl BrainConfig {
             robot: self.robot.clone(),
             fleet: u32::try_from(hash64(self.fleet.as_bytes()) & 0xffff_ffff).unwrap_or(0),
             seeds: self.seeds.clone(),
+            group: self.group,
             listen: self.listen,
             period: self.gossip_period,
             gone_after: self.gone_after,
         }
     }
 
-    /// How many addresses to begin with are not this robot's own.
-    pub(super) fn seeds_of_others(&self) -> usize {
-        self.seeds.iter().filter(|seed| Some(**seed) != self.listen).count()
+    /// How many addresses to begin with are not this robot's own; `remembered` are those that
+    /// others were heard from before.
+    pub(super) fn seeds_of_others(&self, remembered: &[SocketAddr]) -> usize {
+        let seeds = self.seeds.iter().filter(|seed| Some(**seed) != self.listen).count();
+        // who is found has no seeds: what it remembers is all that says that there are others
+        if self.group.is_some() { seeds.max(remembered.len()) } else { seeds }
     }
 }
 

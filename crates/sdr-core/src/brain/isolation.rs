@@ -126,6 +126,11 @@ impl Brain {
         self.seeds_of_others == 0 && self.mesh.authors().count() <= 1
     }
 
+    /// A fleet of one for ever: it looks for nobody either.
+    pub(super) fn is_surely_alone(&self) -> bool {
+        self.is_only_robot() && self.config.group.is_none()
+    }
+
     /// Stops what must not act alone.
     pub(super) fn stop_isolated(&mut self, now: Instant, key: &ComponentKey) {
         let silent = self.lease.acked_at.map(|at| now.since(at).as_millis());

@@ -194,7 +194,7 @@ impl Brain {
         let epochs = epochs.map(|(key, number)| (key, EpochBook::from_disk(number)));
         let mut brain = Box::new(Self {
             me: config.robot.clone(),
-            seeds_of_others: config.seeds_of_others(),
+            seeds_of_others: config.seeds_of_others(&stored.peers),
             config,
             seams,
             mesh,
@@ -380,7 +380,7 @@ impl Brain {
     /// Whether this robot may start what it remembers: it is in step with a peer, or waited
     /// for one long enough.
     fn may_begin(&self, now: Instant) -> bool {
-        let alone = self.seeds_of_others == 0;
+        let alone = self.seeds_of_others == 0 && self.config.group.is_none();
         !self.is_newborn() && (self.mesh.is_in_step() || alone || now >= self.begin_deadline())
     }
 

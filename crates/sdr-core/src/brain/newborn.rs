@@ -34,7 +34,7 @@ impl Brain {
         if self.mesh.is_in_step() {
             self.met_at.get_or_insert(now);
         }
-        let alone = self.is_only_robot();
+        let alone = self.is_surely_alone();
         let waited = self.newborn_deadline().is_some_and(|at| now >= at);
         if alone || waited || self.mesh.has_met_seeds() {
             let is_new = (alone || self.mesh.is_new()) && !self.is_remembered();
@@ -66,7 +66,7 @@ impl Brain {
     /// A robot that lost its disk may have made the next ones already, and others may hold
     /// them: its first one lies a random way further on.
     pub(super) fn number_after(&self, kind: RecordKind, name: &str, known: u64) -> u64 {
-        let forgot = self.mesh.may_have_forgotten() && !self.is_only_robot();
+        let forgot = self.mesh.may_have_forgotten() && !self.is_surely_alone();
         let key = FleetKey { kind, name: if forgot { name.into() } else { String::new() } };
         if !forgot || self.desk.made(&key) || planted::is(Defect::ForgottenReused) {
             return known.saturating_add(1);

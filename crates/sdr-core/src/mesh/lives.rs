@@ -62,8 +62,9 @@ impl Mesh {
     }
 
     /// Whether everybody it was to begin with is in its first life too, and does not know it.
+    /// Who looks for others without knowing whom cannot tell.
     pub fn is_new(&self) -> bool {
-        let none = self.seeds().next().is_none();
+        let none = self.seeds().next().is_none() && self.config.group.is_none();
         none || (self.has_met_seeds() && !self.newborn.others_lived)
     }
 

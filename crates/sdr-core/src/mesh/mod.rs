@@ -128,7 +128,7 @@ impl Mesh {
         now: Instant,
     ) -> Self {
         let mut rng = Rng::new(hash64(config.robot.as_str().as_bytes()) ^ u64::from(own.nonce));
-        let known = config.seeds.iter().chain(peers).copied();
+        let known = config.seeds.iter().chain(&config.group).chain(peers).copied();
         let mut liveness = Liveness::new(config.gone_after, config.period, now);
         liveness.reset(Seat::OWN);
         Self {

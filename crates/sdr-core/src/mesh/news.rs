@@ -15,6 +15,8 @@ pub struct MeshConfig {
     pub fleet: u32,
     /// Addresses to begin with.
     pub seeds: Vec<SocketAddr>,
+    /// Where others may listen whom nobody named; spoken to, and never heard from.
+    pub group: Option<SocketAddr>,
     /// Where this robot listens, when it may tell others.
     pub listen: Option<SocketAddr>,
     /// Time between two rounds; each differs by up to a tenth, by chance.

@@ -79,6 +79,8 @@ pub struct MeshConfig {
     pub listen: SocketAddr,
     /// Where others listen.
     pub seeds: Vec<SocketAddr>,
+    /// How to find more of them on the local network; `None` when nobody looks.
+    pub discovery: Option<Interfaces>,
     /// Time between two rounds of gossip.
     pub gossip_period: Duration,
     /// Age of the last fresh news at which a robot counts as gone.
@@ -87,6 +89,15 @@ pub struct MeshConfig {
     pub rejoin_wait: Duration,
     /// From learning a new mesh key to sealing with it.
     pub key_grace: Duration,
+}
+
+/// On which networks others are looked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Interfaces {
+    /// All but loopback and those of docker.
+    Usual,
+    /// These.
+    Named(Vec<String>),
 }
 
 /// Who can read and write datagrams of the mesh.

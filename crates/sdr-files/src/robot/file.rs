@@ -86,19 +86,20 @@ table! {
         listen: Option<At<String>>,
         /// Where others listen; the rest are learned.
         seeds: Option<At<Vec<At<String>>>>,
+        /// Whether to look for others on the local network, by multicast; default true where the
+        /// mesh has keys, no seeds, and is not on loopback.
+        discovery: Option<bool>,
+        /// Where to look; default: all but loopback and docker*.
+        interfaces: Option<At<Vec<At<String>>>>,
         /// Time between two rounds of gossip; default 350ms.
         gossip_period: Option<At<Duration>>,
-        /// Age of the last news at which a robot counts as gone; default 10s.
+        /// Age of the last news at which a robot counts as gone; default 11.5s.
         gone_after: Option<At<Duration>>,
         /// How long to wait for a peer after the start; default 2s.
         rejoin_wait: Option<At<Duration>>,
         /// From learning a new mesh key to sealing with it; as long again, and older ones
         /// open no more; default 20s.
         key_grace: Option<At<Duration>>,
-    }
-    later {
-        discovery: "finding peers on the local network",
-        interfaces: "choosing interfaces",
     }
 }
 

@@ -5,7 +5,7 @@ use std::{net::SocketAddr, time::Duration};
 use schemars::{Schema, SchemaGenerator, json_schema};
 
 use super::{
-    config::{MeshConfig, Seal},
+    config::{Interfaces, MeshConfig, Seal},
     file::MeshTable,
     places::Places,
 };
@@ -19,6 +19,8 @@ use crate::{
 const MESH_PORT: u16 = 7600;
 /// The API's TCP port when none is given.
 const API_PORT: u16 = 7601;
+/// Most interfaces on which others are looked for.
+const INTERFACES_MAX: usize = 8;
 /// Round what a key that was just learnt waits before it seals.
 const KEY_GRACE: Duration = Duration::from_secs(20);
 
@@ -72,6 +74,7 @@ pub(super) fn mesh(
         None => Some(SocketAddr::from((default, MESH_PORT))),
     };
     let seeds = table.seeds.map(|seeds| seeds.value).unwrap_or_default();
+    let told = !seeds.is_empty() || seal == Seal::Plain;
     let seeds = seeds.iter().filter_map(|seed| within_reach(seed, reach, reader)).collect();
     let mut within = |given: Option<At<Duration>>, default, range| {
         given.map_or(default, |at| bounded(&at, range, reader))
@@ -86,16 +89,61 @@ pub(super) fn mesh(
         let help = format!("allowed: {:?} or more", gossip_period * 3);
         reader.problem(gone_mark.unwrap_or(Mark::FILE), message, Some(help));
     }
+    let listen = listen?;
+    let discovery = discovery(table.discovery, table.interfaces, listen, told, reader);
     Some(MeshConfig {
         fleet: table.fleet.map(|fleet| fleet.value.to_string()),
         seal,
-        listen: listen?,
+        listen,
         seeds,
+        discovery,
         gossip_period,
         gone_after,
         rejoin_wait,
         key_grace,
     })
+}
+
+/// Where others are looked for. Datagrams go to a group of IPv4's. Whoever was `told` of seeds,
+/// or speaks in the open, looks for nobody unless asked to.
+fn discovery(
+    wanted: Option<bool>,
+    interfaces: Option<At<Vec<At<String>>>>,
+    listen: SocketAddr,
+    told: bool,
+    reader: &mut Reader,
+) -> Option<Interfaces> {
+    let usual = !told && !listen.ip().is_loopback() && listen.is_ipv4();
+    if !wanted.unwrap_or(usual || interfaces.is_some()) {
+        return None;
+    }
+    if !listen.is_ipv4() {
+        let mark = interfaces.map_or(Mark::FILE, |at| at.mark);
+        let message = format!("others are looked for by IPv4 multicast, and `listen` is {listen}");
+        let help = String::from("allowed: an IPv4 address behind `listen`, or `discovery = false`");
+        reader.problem(mark, message, Some(help));
+        return None;
+    }
+    let Some(At { value: names, mark }) = interfaces else {
+        // On loopback there is one to look on.
+        return Some(match listen.ip().is_loopback() {
+            true => Interfaces::Named(vec!["lo".into()]),
+            false => Interfaces::Usual,
+        });
+    };
+    if names.is_empty() || names.len() > INTERFACES_MAX {
+        let message = format!("{} interfaces", names.len());
+        reader.problem(mark, message, Some(format!("allowed: 1 to {INTERFACES_MAX}")));
+    }
+    for At { value: name, mark } in &names {
+        let plain = |c: char| c.is_ascii_graphic() && c != '/';
+        if name.is_empty() || name.len() > 15 || !name.chars().all(plain) {
+            let message = format!("`{name}` is no name of an interface");
+            let help = String::from("allowed: such as wlan0, at most 15 characters");
+            reader.problem(*mark, message, Some(help));
+        }
+    }
+    Some(Interfaces::Named(names.into_iter().map(|at| at.value).collect()))
 }
 
 /// Where operators of other machines reach the API; they need certificates.

@@ -13,8 +13,8 @@ mod sources;
 use std::path::Path;
 
 pub use config::{
-    ApiConfig, CapacityConfig, Cgroup, ComponentsConfig, DeviceConfig, LogConfig, LogFormat,
-    LogsConfig, MeshConfig, RadioConfig, RecordingsConfig, RobotConfig, RosConfig, Seal,
+    ApiConfig, CapacityConfig, Cgroup, ComponentsConfig, DeviceConfig, Interfaces, LogConfig,
+    LogFormat, LogsConfig, MeshConfig, RadioConfig, RecordingsConfig, RobotConfig, RosConfig, Seal,
     SensorsConfig, StorageConfig, SystemPort,
 };
 pub use places::Places;

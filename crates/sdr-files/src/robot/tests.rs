@@ -70,7 +70,7 @@ fn plain_datagrams_stay_on_loopback() {
 #[test]
 fn every_problem_is_told_at_once() {
     let problems = parse(
-        "[robot]\nnmae = \"x\"\n[mesh]\nunsealed = true\ndiscovery = true\n[capacity]\nmemory = \"2\"\n",
+        "[robot]\nnmae = \"x\"\n[mesh]\nunsealed = true\ndiscovery = 5\n[capacity]\nmemory = \"2\"\n",
     )
     .unwrap_err();
 

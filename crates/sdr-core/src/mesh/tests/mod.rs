@@ -35,6 +35,7 @@ fn mesh(number: usize, robots: usize, counter: u64) -> Mesh {
         robot: robot(number),
         fleet: FLEET,
         seeds: (0..robots).map(address).collect(),
+        group: None,
         listen: Some(address(number)),
         period: Duration::from_millis(250),
         gone_after: Duration::from_secs(5),
