@@ -19,7 +19,7 @@ fn read<T: DeserializeOwned + Serialize + PartialEq + std::fmt::Debug>(bytes: &[
                     let line = match encode_line(&message) {
                         Ok(line) => line,
                         // escapes may make a line longer than it came
-                        Err(LineError::TooLong) => continue,
+                        Err(LineError::TooLong { .. }) => continue,
                         Err(error) => panic!("what was read cannot be written: {error}"),
                     };
                     assert!(line.len() <= LINE_BYTES_MAX);

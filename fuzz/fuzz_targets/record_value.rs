@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
 use sdr_core::{
+    blob::BlobRef,
     input::Input,
     mesh::{FleetRecord, Incarnation},
     order::{Epoch, Version},
@@ -19,10 +20,16 @@ const TAG: u8 = 16;
 fn record(choices: &mut Choices<'_>) -> FleetRecord {
     let kind = RecordKind(choices.byte() % 15);
     let name = match kind {
-        RecordKind::SYSTEM | RecordKind::ALLOCATION | RecordKind::RECOVERY => "watch",
-        RecordKind::COMPONENT => ["watch/camera", "watch/anomaly"][usize::from(choices.byte() % 2)],
+        RecordKind::SYSTEM
+        | RecordKind::ALLOCATION
+        | RecordKind::RECOVERY
+        | RecordKind::LARGE_ALLOCATION
+        | RecordKind::LARGE_RECOVERY => "watch",
+        RecordKind::COMPONENT | RecordKind::LARGE_COMPONENT => {
+            ["watch/camera", "watch/anomaly"][usize::from(choices.byte() % 2)]
+        }
         RecordKind::CONNECTION => "watch/0",
-        RecordKind::ASSIGNMENT => "watch/camera",
+        RecordKind::ASSIGNMENT | RecordKind::LATCH => "watch/camera",
         _ => "",
     };
     let epoch = choices.byte();
@@ -46,7 +53,12 @@ fuzz_target!(|bytes: &[u8]| {
         if choices.is_empty() {
             break;
         }
-        let record = record(&mut choices);
+        let mut record = record(&mut choices);
+        if RecordKind::LARGE.contains(&record.key.kind) && !record.value.is_empty() {
+            // as a blob that others have
+            shell.gift = std::mem::take(&mut record.value);
+            record.value = FleetValue::Large(BlobRef::of(&shell.gift)).encode();
+        }
         let read = || FleetValue::decode(record.key.kind, &record.value);
         if let Ok(value) = meter::at_most(256 * 1024, read)
             && value != FleetValue::Unknown

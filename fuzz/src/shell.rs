@@ -32,6 +32,9 @@ pub struct Shell {
     pub answers: usize,
     /// Processes started.
     pub launched: usize,
+    /// What others give who are asked for a blob.
+    pub gift: Vec<u8>,
+    fetches: usize,
 }
 
 /// What the robot under test is told at its start.
@@ -67,7 +70,15 @@ impl Shell {
     pub fn new(stored: Option<StoredState>) -> Self {
         let now = Instant::from_millis(1000);
         let brain = Brain::new(config(), seams(), stored, now);
-        let mut shell = Self { brain, now, waiting: Vec::new(), answers: 0, launched: 0 };
+        let mut shell = Self {
+            brain,
+            now,
+            waiting: Vec::new(),
+            answers: 0,
+            launched: 0,
+            gift: Vec::new(),
+            fetches: 0,
+        };
         shell.drain();
         shell
     }
@@ -121,6 +132,15 @@ impl Shell {
         match effect {
             Effect::Send { bytes, .. } => assert!(bytes.len() <= 1200),
             Effect::Store { ticket, .. } => self.waiting.push(Input::Stored { ticket }),
+            Effect::Fetch { blob, .. } => {
+                assert!(blob.is_allowed());
+                self.fetches += 1;
+                let bytes = match self.fetches % 2 {
+                    1 => Err("nobody has it".into()),
+                    _ => Ok(self.gift.clone()),
+                };
+                self.waiting.push(Input::Fetched { blob, result: bytes });
+            }
             Effect::Launch(order) => {
                 self.launched += 1;
                 let instance = order.instance;

@@ -56,6 +56,7 @@ impl Probe for Watch {
             | Input::MoveRole { .. }
             | Input::RolePolicy { .. }
             | Input::Planned { .. }
+            | Input::Fetched { .. }
             | Input::Stored { .. }
             | Input::StoreFailed { .. } => "other",
         };

@@ -7,9 +7,12 @@ use std::path::PathBuf;
 use rand::TryRngCore as _;
 use rand::rngs::OsRng;
 use sdr_component::protocol::SharedMemory;
-use sdr_core::{brain::BrainConfig, order::hash64, report::RobotFacts, units::Bytes};
+use sdr_core::{
+    blob::PART_BYTES_MAX, brain::BrainConfig, order::hash64, record::RECORD_BYTES_MAX,
+    report::RobotFacts, units::Bytes,
+};
 use sdr_files::RobotConfig;
-use sdr_files::robot::{BatterySource, DeviceConfig, PositionSource, RssiSource};
+use sdr_files::robot::{BatterySource, DeviceConfig, PositionSource, RssiSource, Seal};
 
 use crate::installed::{self, Device};
 use crate::metrics::{MetricsConfig, Radio, Sensors, Source, host};
@@ -74,6 +77,11 @@ pub(crate) fn brain(config: &RobotConfig, fleet: Option<&str>) -> BrainConfig {
         gossip_period: config.mesh.gossip_period,
         gone_after: config.mesh.gone_after,
         rejoin_wait: config.mesh.rejoin_wait,
+        part_bytes_max: match config.mesh.seal {
+            Seal::Keys(_) => PART_BYTES_MAX,
+            // blobs travel over sealed streams alone
+            Seal::Plain => RECORD_BYTES_MAX,
+        },
         ..BrainConfig::new(config.name.clone(), facts)
     }
 }

@@ -4,6 +4,7 @@ use sdr_core::{effect::Effect, input::Input};
 use tokio::sync::mpsc;
 
 use crate::api::{AnswerDesk, LatestPlan};
+use crate::blobs::Parts;
 use crate::data::Data;
 use crate::events::Events;
 use crate::mesh::udp::Mesh;
@@ -17,6 +18,7 @@ use crate::supervisor::Supervisor;
 pub(crate) struct Effects {
     pub(crate) mesh: Mesh,
     pub(crate) store: Store,
+    pub(crate) parts: Parts,
     pub(crate) supervisor: Supervisor,
     pub(crate) data: Data,
     pub(crate) desk: AnswerDesk,
@@ -33,6 +35,7 @@ impl Effects {
         match effect {
             Effect::Send { to, bytes } => self.mesh.send(to, &bytes),
             Effect::Store { ticket, change } => self.store.put(ticket, change),
+            Effect::Fetch { blob, from } => self.parts.fetch(blob, from),
             Effect::Launch(order) => self.supervisor.launch(*order),
             Effect::Command { instance, command } => self.supervisor.command(instance, command),
             Effect::Routes(routes) => self.data.set_routes(routes),

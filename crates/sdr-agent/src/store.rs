@@ -15,6 +15,7 @@ use sdr_core::{
 };
 use tokio::sync::mpsc;
 
+use crate::blobs::BlobStore;
 use crate::events::Events;
 
 const FILE_NAME: &str = "state";
@@ -59,12 +60,14 @@ impl Store {
     /// Starts the writer for the folder `dir`; outcomes go to `inputs`.
     pub(crate) fn start(
         dir: PathBuf,
+        parts: BlobStore,
         inputs: mpsc::Sender<Input>,
         events: Events,
     ) -> io::Result<Self> {
         let slot = Arc::new(Slot::default());
         let state = StoredState::default();
-        let desk = Desk { slot: Arc::clone(&slot), dir, inputs, events, state, failing: false };
+        let own = Arc::clone(&slot);
+        let desk = Desk { slot: own, dir, parts, inputs, events, state, failing: false };
         let writer = thread::Builder::new().name("store".into()).spawn(move || desk.run())?;
         Ok(Self { slot, writer: Some(writer) })
     }
@@ -96,6 +99,7 @@ impl Drop for Store {
 struct Desk {
     slot: Arc<Slot>,
     dir: PathBuf,
+    parts: BlobStore,
     inputs: mpsc::Sender<Input>,
     events: Events,
     state: StoredState,
@@ -105,14 +109,12 @@ struct Desk {
 impl Desk {
     fn run(mut self) {
         while let Some((ticket, changes)) = self.slot.take() {
-            changes.into_iter().for_each(|change| self.state.take(change));
-            let outcome = match write(&self.dir, &self.state) {
+            let outcome = match self.write(changes) {
                 Ok(()) => {
                     self.turn(false, "the state reaches the disk again");
                     Input::Stored { ticket }
                 }
-                Err(error) => {
-                    let reason = format!("{}: {error}", self.dir.join(FILE_NAME).display());
+                Err(reason) => {
                     self.turn(true, &reason);
                     Input::StoreFailed { ticket, reason }
                 }
@@ -122,6 +124,24 @@ impl Desk {
                 return;
             }
         }
+    }
+
+    /// What the state names is there before it, and goes after it.
+    fn write(&mut self, changes: Vec<StoredChange>) -> Result<(), String> {
+        let mut kept = Ok(());
+        for mut change in changes {
+            let blobs = std::mem::take(&mut change.blobs);
+            // the brain tells all anew after a failure; nothing of this order is on disk then
+            kept = kept.and_then(|()| self.parts.keep_parts(&blobs));
+            self.state.take(change);
+        }
+        kept.map_err(|error| error.to_string())?;
+        let file = self.dir.join(FILE_NAME);
+        write(&self.dir, &self.state).map_err(|error| format!("{}: {error}", file.display()))?;
+        if let Err(error) = self.parts.sweep_parts(&self.state.blobs().collect()) {
+            tracing::warn!(event = "parts-unswept", %error, next = "with the next state");
+        }
+        Ok(())
     }
 
     /// Says that the disk began to fail, or to work again; not each time.
@@ -193,6 +213,10 @@ fn write(dir: &Path, state: &StoredState) -> io::Result<()> {
 mod tests {
     use super::*;
 
+    fn parts(dir: &Path) -> BlobStore {
+        BlobStore::open(dir, 1 << 20).unwrap()
+    }
+
     fn events() -> Events {
         Events::new(sdr_core::id::RobotId::new("robot-1").unwrap())
     }
@@ -209,7 +233,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let (inputs, mut outcomes) = mpsc::channel(64);
 
-        let store = Store::start(dir.path().into(), inputs, events()).unwrap();
+        let store = Store::start(dir.path().into(), parts(dir.path()), inputs, events()).unwrap();
         for ticket in 1..=20 {
             store.put(ticket, change(ticket));
         }
@@ -254,7 +278,7 @@ mod tests {
 
         let events = events();
 
-        let store = Store::start(gone, inputs, events.clone()).unwrap();
+        let store = Store::start(gone, parts(dir.path()), inputs, events.clone()).unwrap();
         store.put(7, change(1));
         drop(store);
 

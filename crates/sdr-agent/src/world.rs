@@ -17,7 +17,7 @@ use thiserror::Error;
 use tokio::sync::{mpsc, watch};
 
 use crate::api::{self, AnswerDesk, Api, ApiError, ApiState, LatestPlan, Profiles, Question};
-use crate::blobs::{BlobStore, StoreError, Streams, StreamsError};
+use crate::blobs::{BlobStore, Parts, StoreError, Streams, StreamsError};
 use crate::data::{Data, DataConfig, DataError};
 use crate::effects::Effects;
 use crate::events::Events;
@@ -153,38 +153,32 @@ impl World {
         // Before anything is cleaned: whoever answers there is a living agent.
         let listener = api::open(&robot.api.socket).await?;
         let ground = prepare(robot, lock)?;
-        let (sender, inputs) = mpsc::channel(INPUTS_MAX);
+        let (inputs, told) = mpsc::channel(INPUTS_MAX);
         let (asker, questions) = mpsc::channel(QUESTIONS_MAX);
         let trouble = Trouble::new(ground.events.clone());
 
         let keys = FleetKeys::open(robot, &ground.events, &trouble)?;
         let remote = api::open_remote(robot.api.listen).await?;
-        let (mesh, streams) = start_mesh(robot, keys.clone(), sender.clone(), &trouble).await?;
-        let fleet = keys.as_ref().map(|keys| keys.identity().fleet());
-        let mut brain_config = config::brain(robot, fleet);
-        brain_config.group = mesh.group();
-        brain_config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
-        let installed = look_around(robot, &brain_config, &sender);
+        let blobs = BlobStore::open(state, BLOBS_BYTES_MAX)?;
+        let (mesh, streams) =
+            start_mesh(robot, keys.clone(), blobs.clone(), inputs.clone(), &trouble).await?;
+        let brain_config = brain_config(robot, keys.as_ref(), &mesh);
+        let installed = look_around(robot, &brain_config, &inputs);
         let brain = Brain::new(brain_config, seams(), ground.stored, clock::now());
 
-        let outlets = Outlets {
-            inputs: sender.clone(),
-            watch: Watch::default(),
-            record: ground.record,
-            trouble: trouble.clone(),
-            types: PortTypes::default(),
-        };
+        let outlets = outlets(inputs.clone(), ground.record, &trouble);
         let (supervisor, adopted) =
             Supervisor::start(config::supervisor(robot), outlets.clone(), ground.survivors)
                 .map_err(because("components' socket"))?;
-        let store = Store::start(state.clone(), sender.clone(), ground.events.clone())
+        let parts = Parts::new(blobs.clone(), streams.clone(), inputs.clone());
+        let store = Store::start(state.clone(), blobs, inputs.clone(), ground.events.clone())
             .map_err(because("store"))?;
         let (metrics, data) = start_senses(robot, outlets)?;
 
         let (desk, plan) = (AnswerDesk::default(), LatestPlan::default());
         let api_state = ApiState {
             robot: robot.name.clone(),
-            inputs: sender.clone(),
+            inputs: inputs.clone(),
             questions: asker,
             desk: desk.clone(),
             events: ground.events.clone(),
@@ -203,11 +197,11 @@ impl World {
         installed.watch();
         let events = ground.events;
         let path = config::component_path(robot);
-        let programs = Programs::new(robot.name.clone(), path, sender.clone());
+        let programs = Programs::new(robot.name.clone(), path, inputs.clone());
         let effects =
-            Effects { mesh, store, supervisor, data, desk, events, plan, programs, inputs: sender };
+            Effects { mesh, store, parts, supervisor, data, desk, events, plan, programs, inputs };
         let world = Self {
-            inputs,
+            inputs: told,
             adopted,
             questions,
             effects,
@@ -252,10 +246,30 @@ impl World {
     }
 }
 
+/// The brain's, with where the mesh listens and looks.
+fn brain_config(robot: &RobotConfig, keys: Option<&FleetKeys>, mesh: &Mesh) -> BrainConfig {
+    let mut config = config::brain(robot, keys.map(|keys| keys.identity().fleet()));
+    config.group = mesh.group();
+    config.listen = mesh.local_address().ok().filter(|own| !own.ip().is_unspecified());
+    config
+}
+
+/// What drivers tell, and to whom.
+fn outlets(inputs: mpsc::Sender<Input>, record: RecordSender, trouble: &Trouble) -> Outlets {
+    Outlets {
+        inputs,
+        watch: Watch::default(),
+        record,
+        trouble: trouble.clone(),
+        types: PortTypes::default(),
+    }
+}
+
 /// Opens the one port of the mesh; with keys it carries streams too.
 async fn start_mesh(
     robot: &RobotConfig,
     keys: Option<FleetKeys>,
+    store: BlobStore,
     inputs: mpsc::Sender<Input>,
     trouble: &Trouble,
 ) -> Result<(Mesh, Option<Streams>), StartError> {
@@ -270,7 +284,6 @@ async fn start_mesh(
     };
     let (stream_sender, packets) = mpsc::channel(PACKETS_MAX);
     let (hint_sender, hints) = mpsc::channel(HINTS_MAX);
-    let store = BlobStore::open(robot.storage.state.join("blobs"), BLOBS_BYTES_MAX)?;
     let streams = Streams::start(socket.clone(), packets, keys.clone(), store)?;
     streams.follow_hints(hints);
     let sidings = Sidings { streams: stream_sender, hints: hint_sender };

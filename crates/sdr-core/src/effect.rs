@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     allocate::Problem,
     api::Accepted,
+    blob::{Blob, BlobHash, BlobRef},
     event::Event,
     id::{ComponentKey, Name, RobotId},
     input::{InstanceId, PlanId, QuestionId, RequestId, StoreTicket},
@@ -35,6 +36,13 @@ pub enum Effect {
         ticket: StoreTicket,
         /// What is new since the order before.
         change: StoredChange,
+    },
+    /// Bring a blob, from the own disk or else from another robot; answered by `Fetched`.
+    Fetch {
+        /// Which bytes.
+        blob: BlobRef,
+        /// Robots that may have it, in this order; at most four.
+        from: Vec<SocketAddr>,
     },
     /// Start a process; answered by instance news.
     Launch(Box<LaunchOrder>),
@@ -173,6 +181,11 @@ pub struct StoredState {
 }
 
 impl StoredState {
+    /// Blobs that its facts name: all others may go from the disk.
+    pub fn blobs(&self) -> impl Iterator<Item = BlobHash> {
+        self.fleet.large().map(|(_, name)| name.hash)
+    }
+
     /// Takes a change in; it costs what changed, not what is there.
     pub fn take(&mut self, change: StoredChange) {
         if change.whole {
@@ -210,4 +223,6 @@ pub struct StoredChange {
     pub epochs: Vec<(ComponentKey, u64)>,
     /// All peers, when there are others than before.
     pub peers: Option<Vec<SocketAddr>>,
+    /// Large parts that facts name and that may not be on disk yet: they come before the state.
+    pub blobs: Vec<Blob>,
 }

@@ -5,6 +5,7 @@ use core::{net::SocketAddr, time::Duration};
 
 use crate::{
     allocate::{AllocError, Plan},
+    blob::BlobRef,
     effect::InputWiring,
     fitness::RolePolicy,
     id::{ComponentKey, Name, RobotId},
@@ -122,6 +123,13 @@ pub enum Input {
         plan: PlanId,
         /// The answer.
         result: Result<Plan, AllocError>,
+    },
+    /// What came of [`crate::effect::Effect::Fetch`].
+    Fetched {
+        /// Which blob.
+        blob: BlobRef,
+        /// Its bytes, or why nobody gave them, for people.
+        result: Result<Vec<u8>, String>,
     },
     /// A store order reached the disk.
     Stored {

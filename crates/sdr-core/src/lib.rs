@@ -36,6 +36,7 @@ pub mod rng;
 pub mod time;
 pub mod units;
 
+pub mod blob;
 pub mod record;
 pub mod report;
 pub mod spec;

@@ -2,13 +2,15 @@
 //!
 //! A system travels as one small record per component and per connection, so that each
 //! fits a datagram. A [`SystemRecord`] of some revision is complete once as many component
-//! and connection records of that revision are there as it counts.
+//! and connection records of that revision are there as it counts. A part that is too long
+//! stands in a blob, which a record of another kind names ([`crate::blob`]).
 
 use alloc::{string::String, sync::Arc, vec::Vec};
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
+    blob::BlobRef,
     fitness::RolePolicy,
     id::{ComponentKey, Name, RobotId},
     spec::{ComponentSpec, ConnectionSpec, PolicyBytes},
@@ -43,6 +45,40 @@ impl RecordKind {
     pub const ROLE_POLICY: Self = Self(10);
     /// [`Latch`], keyed by the component.
     pub const LATCH: Self = Self(14);
+    /// [`BlobRef`] of a [`ComponentSpec`], keyed as [`Self::COMPONENT`].
+    pub const LARGE_COMPONENT: Self = Self(11);
+    /// [`BlobRef`] of an allocation policy, keyed by the system.
+    pub const LARGE_ALLOCATION: Self = Self(12);
+    /// [`BlobRef`] of a recovery policy, keyed by the system.
+    pub const LARGE_RECOVERY: Self = Self(13);
+    /// Parts of systems that are too long for a record.
+    pub const LARGE: [Self; 3] =
+        [Self::LARGE_COMPONENT, Self::LARGE_ALLOCATION, Self::LARGE_RECOVERY];
+    /// Parts of systems, which a greater version of their system outdates.
+    pub const PARTS: [Self; 7] = [
+        Self::COMPONENT,
+        Self::CONNECTION,
+        Self::ALLOCATION,
+        Self::RECOVERY,
+        Self::LARGE_COMPONENT,
+        Self::LARGE_ALLOCATION,
+        Self::LARGE_RECOVERY,
+    ];
+
+    /// The kind that names a blob instead of holding its value; `None` when there is none.
+    pub fn large(self) -> Option<Self> {
+        Self::LARGE.into_iter().find(|large| large.of_large() == self)
+    }
+
+    /// The kind whose bytes a blob of this kind has; others are their own.
+    pub fn of_large(self) -> Self {
+        match self {
+            Self::LARGE_COMPONENT => Self::COMPONENT,
+            Self::LARGE_ALLOCATION => Self::ALLOCATION,
+            Self::LARGE_RECOVERY => Self::RECOVERY,
+            _ => self,
+        }
+    }
 }
 
 /// Names one shared fact.
@@ -156,6 +192,8 @@ pub enum FleetValue {
     RolePolicy(RolePolicy),
     /// An emergency stop, or its end.
     Latch(Latch),
+    /// A part of a system that stands in a blob.
+    Large(BlobRef),
     /// A kind that this version does not know; kept and passed on.
     Unknown,
 }
@@ -184,6 +222,7 @@ impl FleetValue {
             RecordKind::ROLE => take(bytes).map(Self::Role),
             RecordKind::ROLE_POLICY => take(bytes).map(Self::RolePolicy),
             RecordKind::LATCH => take(bytes).map(Self::Latch),
+            kind if RecordKind::LARGE.contains(&kind) => take(bytes).map(Self::Large),
             _ => Ok(Self::Unknown),
         }
     }
@@ -199,6 +238,7 @@ impl FleetValue {
             Self::Role(value) => postcard::to_allocvec(value),
             Self::RolePolicy(value) => postcard::to_allocvec(value),
             Self::Latch(value) => postcard::to_allocvec(value),
+            Self::Large(value) => postcard::to_allocvec(value),
             Self::Unknown => Ok(Vec::new()),
         };
         bytes.expect("writing plain data to memory cannot fail")

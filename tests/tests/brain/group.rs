@@ -32,6 +32,7 @@ fn alone(group: Option<SocketAddr>, time: Duration) -> (u64, usize) {
                 }
                 Effect::Send { to, .. } if Some(to) == group => sent += 1,
                 Effect::Send { .. }
+                | Effect::Fetch { .. }
                 | Effect::Launch(_)
                 | Effect::Command { .. }
                 | Effect::Routes(_)

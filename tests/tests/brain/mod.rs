@@ -5,6 +5,7 @@ mod again;
 mod deployment;
 mod group;
 mod own_recovery;
+mod parts;
 mod policies;
 mod recovery;
 mod role;

@@ -93,6 +93,7 @@ fn a_system_whose_policies_another_version_wrote_runs_by_the_defaults() {
                 Effect::Store { ticket, .. } => brain.handle(now, Input::Stored { ticket }),
                 Effect::Event(event) => told.push(event.kind),
                 Effect::Send { .. }
+                | Effect::Fetch { .. }
                 | Effect::Command { .. }
                 | Effect::Routes(_)
                 | Effect::Plan { .. }

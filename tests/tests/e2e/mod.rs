@@ -9,6 +9,7 @@ mod keys;
 mod lab;
 mod life;
 mod limits;
+mod parts;
 mod role;
 mod standby;
 mod strangers;

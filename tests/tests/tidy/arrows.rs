@@ -7,7 +7,7 @@ use super::tree::{expect_none, metadata, root};
 /// May be linked into a core that has no operating system.
 const PURE: [&str; 3] = ["sdr-core", "sdr-alloc", "sdr-recovery"];
 /// All that pure crates may use, besides each other.
-const PURE_USES: [&str; 3] = ["thiserror", "serde", "postcard"];
+const PURE_USES: [&str; 4] = ["thiserror", "serde", "postcard", "blake3"];
 /// May know everybody.
 const ABOVE_ALL: [&str; 2] = ["sdr-tests", "sdr-benches"];
 

@@ -7,11 +7,12 @@ use axum::body::Bytes;
 use axum::extract::rejection::{BytesRejection, QueryRejection};
 use axum::extract::{Path, Query, State};
 use axum::http::StatusCode;
+use sdr_core::blob::BlobHash;
 use serde::{Deserialize, Serialize};
 
 use super::ApiState;
 use super::answer::Refusal;
-use crate::blobs::{BlobHash, FetchError, StoreError, Streams};
+use crate::blobs::{FetchError, Keep, StoreError, Streams};
 
 /// `POST /v1/blobs`.
 #[derive(Debug, Serialize)]
@@ -61,7 +62,8 @@ pub(super) async fn bring(
     })?;
     let streams = streams(&state)?;
     if let Whence { from: Some(from), length: Some(length) } = whence {
-        return streams.fetch(from, hash, length).await.map_err(|error| not_brought(&error));
+        let brought = streams.fetch(from, hash, length, Keep::Here).await;
+        return brought.map_err(|error| not_brought(&error));
     }
     let store = streams.store().clone();
     let read = tokio::task::spawn_blocking(move || store.read(&hash)).await;

@@ -13,7 +13,7 @@ use sdr_core::{
 };
 
 use super::answer::Refusal;
-use super::{ApiState, BODY_BYTES_MAX};
+use super::{ApiState, SYSTEM_BYTES_MAX};
 use crate::installed::{Look, LoopEnded};
 
 /// How long the brain and the disk have to accept a system.
@@ -24,7 +24,7 @@ pub(super) async fn deploy(
     request: Request,
 ) -> Result<Json<DeployAnswer>, Refusal> {
     // Before the body is waited for: it may never come.
-    if announced(&request).is_some_and(|length| length > BODY_BYTES_MAX) {
+    if announced(&request).is_some_and(|length| length > SYSTEM_BYTES_MAX) {
         return Err(too_large());
     }
     let body = Bytes::from_request(request, &()).await;
@@ -51,7 +51,7 @@ fn announced(request: &Request) -> Option<usize> {
 }
 
 fn too_large() -> Refusal {
-    let error = format!("the body is larger than {BODY_BYTES_MAX} bytes");
+    let error = format!("the body is larger than {SYSTEM_BYTES_MAX} bytes");
     Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, error)
 }
 

@@ -49,6 +49,8 @@ pub(crate) use components::Profiles;
 
 /// Largest body of a request, bytes.
 const BODY_BYTES_MAX: usize = 1 << 20;
+/// Largest body of a deployment: a system with its large parts, as text.
+const SYSTEM_BYTES_MAX: usize = 16 << 20;
 
 /// A question that only the loop can answer, since it holds the brain.
 #[derive(Debug)]
@@ -226,7 +228,7 @@ fn router(state: ApiState) -> Router {
         .route("/v1/health", get(views::health))
         .route("/v1/plan", get(views::plan))
         .route("/v1/recording", get(views::recording))
-        .route("/v1/deploy", post(deploy::deploy))
+        .route("/v1/deploy", post(deploy::deploy).layer(DefaultBodyLimit::max(SYSTEM_BYTES_MAX)))
         .route("/v1/systems/{name}", delete(deploy::undeploy))
         .route("/v1/reset", post(reset::reset))
         .route("/v1/role/move", post(role::hand_over))

@@ -187,7 +187,7 @@ async fn every_refusal_is_json_that_says_what_is_allowed() {
 async fn a_body_beyond_the_bound_is_refused_before_it_comes() {
     let bench = Bench::new().await;
     let mut client = Client::connect(&bench.api.path).unwrap();
-    let length = BODY_BYTES_MAX + 1;
+    let length = SYSTEM_BYTES_MAX + 1;
     let head = "POST /v1/deploy HTTP/1.1\r\nhost: x\r\ncontent-length";
 
     let read = tokio::task::spawn_blocking(move || {
@@ -200,7 +200,7 @@ async fn a_body_beyond_the_bound_is_refused_before_it_comes() {
 
     let text = read.await.unwrap();
     assert!(text.starts_with("HTTP/1.1 413"), "{text}");
-    assert!(text.contains("larger than 1048576 bytes"), "{text}");
+    assert!(text.contains("larger than 16777216 bytes"), "{text}");
 }
 
 #[tokio::test]

@@ -4,12 +4,13 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use quinn::{Connection, RecvStream};
+use sdr_core::blob::BlobHash;
 use sdr_keys::stream::{DELIVERY_BYTES_MAX, Request, Status};
 use sdr_keys::{Delivery, KeyId};
 use thiserror::Error;
 use tokio::time::timeout;
 
-use super::{BlobHash, BlobStore, StoreError, Streams, store::BLOB_BYTES_MAX};
+use super::{BlobStore, Keep, StoreError, Streams, store::BLOB_BYTES_MAX};
 
 /// How long a handshake may take.
 const CONNECT_WITHIN: Duration = Duration::from_secs(5);
@@ -66,6 +67,7 @@ impl Streams {
         peer: SocketAddr,
         hash: BlobHash,
         length: u64,
+        keep: Keep,
     ) -> Result<Vec<u8>, FetchError> {
         if length > BLOB_BYTES_MAX {
             return Err(StoreError::TooLarge { length, allowed: BLOB_BYTES_MAX }.into());
@@ -96,7 +98,7 @@ impl Streams {
             self.on_disk(move |store| store.keep_partial(&hash, &bytes)).await?;
             return Err(FetchError::Broken { peer, came, length, reason });
         }
-        self.on_disk(move |store| store.finish(&hash, &bytes).map(|()| bytes)).await
+        self.on_disk(move |store| store.finish(&hash, &bytes, keep).map(|()| bytes)).await
     }
 
     /// Disk and hashing are not for the loop's thread.

@@ -7,6 +7,7 @@
 //! ```
 
 mod fetch;
+mod parts;
 mod port;
 mod rotation;
 mod serve;
@@ -32,7 +33,8 @@ use tokio::sync::mpsc;
 use crate::mesh::keys::FleetKeys;
 use crate::mesh::sealed::KeyHint;
 pub(crate) use fetch::FetchError;
-pub(crate) use store::{BLOB_BYTES_MAX, BlobHash, BlobStore, StoreError};
+pub(crate) use parts::Parts;
+pub(crate) use store::{BLOB_BYTES_MAX, BlobStore, Keep, StoreError};
 
 /// First guess of a round trip; the library's own 333 ms would make a lost packet of a
 /// handshake cost a second.

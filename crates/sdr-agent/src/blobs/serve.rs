@@ -4,12 +4,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use quinn::{Connection, RecvStream, SendStream, VarInt};
+use sdr_core::blob::BlobHash;
 use sdr_keys::Fingerprint;
 use sdr_keys::stream::{REQUEST_BYTES_MAX, Request, Status};
 use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
-use super::{BlobHash, Streams};
+use super::Streams;
 
 /// Robots that are served at a time.
 const CONNECTIONS_MAX: usize = 32;

@@ -1,45 +1,17 @@
 //! Blobs on this robot's disk, named by their hash.
 
-use std::fmt;
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
+use sdr_core::blob::{Blob, BlobHash};
 use thiserror::Error;
 
 /// Largest blob, bytes.
 pub(crate) const BLOB_BYTES_MAX: u64 = 64 << 20;
-
-/// Names a blob: the BLAKE3 hash of its bytes.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct BlobHash(pub(crate) [u8; 32]);
-
-impl BlobHash {
-    /// Of all bytes of a blob.
-    pub(crate) fn of(bytes: &[u8]) -> Self {
-        Self(*blake3::hash(bytes).as_bytes())
-    }
-
-    /// Reads 64 lower-case hexadecimal digits.
-    pub(crate) fn parse(text: &str) -> Option<Self> {
-        let lower = text.bytes().all(|byte| !byte.is_ascii_uppercase());
-        blake3::Hash::from_hex(text).ok().filter(|_| lower).map(|hash| Self(*hash.as_bytes()))
-    }
-}
-
-impl fmt::Display for BlobHash {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(blake3::Hash::from_bytes(self.0).to_hex().as_str())
-    }
-}
-
-impl fmt::Debug for BlobHash {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "BlobHash({self})")
-    }
-}
 
 /// Why a blob is not kept. Nothing changed.
 #[derive(Debug, Error)]
@@ -70,19 +42,56 @@ pub(crate) enum StoreError {
     },
 }
 
-/// A folder of blobs with a quota; cheap to clone.
+/// Who keeps what was brought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Keep {
+    /// The store.
+    Here,
+    /// Whoever asked.
+    Elsewhere,
+}
+
+/// A folder of blobs with a quota, and beside it one of parts of systems, which stay as long as
+/// a record names them; cheap to clone.
 #[derive(Clone, Debug)]
 pub(crate) struct BlobStore {
     folder: Arc<PathBuf>,
+    parts: Arc<PathBuf>,
     quota: u64,
 }
 
 impl BlobStore {
-    /// The store in `folder`, which is made; all blobs together take at most `quota` bytes:
-    /// those that were used least lately go first.
-    pub(crate) fn open(folder: PathBuf, quota: u64) -> Result<Self, StoreError> {
-        fs::create_dir_all(&folder).map_err(at(&folder))?;
-        Ok(Self { folder: Arc::new(folder), quota })
+    /// The store in `state`, whose folders are made; all blobs together take at most `quota`
+    /// bytes: those that were used least lately go first. Parts are bounded by the brain.
+    pub(crate) fn open(state: &Path, quota: u64) -> Result<Self, StoreError> {
+        let (folder, parts) = (state.join("blobs"), state.join("parts"));
+        for made in [&folder, &parts] {
+            fs::create_dir_all(made).map_err(at(made))?;
+        }
+        Ok(Self { folder: Arc::new(folder), parts: Arc::new(parts), quota })
+    }
+
+    /// Keeps parts of systems until [`BlobStore::sweep_parts`] does not name them.
+    pub(crate) fn keep_parts(&self, parts: &[Blob]) -> Result<(), StoreError> {
+        for Blob { hash, bytes } in parts {
+            let path = self.parts.join(hash.to_string());
+            if matches!(read_bounded(&path), Ok(Some(there)) if there == **bytes) {
+                continue;
+            }
+            write_whole(&path.with_extension("new"), &path, bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Removes all parts but those named.
+    pub(crate) fn sweep_parts(&self, named: &BTreeSet<BlobHash>) -> Result<(), StoreError> {
+        for entry in fs::read_dir(&*self.parts).map_err(at(&self.parts))?.flatten() {
+            let hash = entry.file_name().to_str().and_then(BlobHash::parse);
+            if hash.is_none_or(|hash| !named.contains(&hash)) {
+                remove(&entry.path())?;
+            }
+        }
+        Ok(())
     }
 
     /// Keeps a blob; its name.
@@ -90,18 +99,18 @@ impl BlobStore {
         let hash = BlobHash::of(bytes);
         if self.read(&hash)?.is_none() {
             self.make_room(length(bytes))?;
-            let part = self.part(&hash);
-            let written = File::create(&part).and_then(|mut file| {
-                file.write_all(bytes)?;
-                file.sync_all()
-            });
-            written.and_then(|()| fs::rename(&part, self.path(&hash))).map_err(at(&part))?;
+            write_whole(&self.part(&hash), &self.path(&hash), bytes)?;
         }
         Ok(hash)
     }
 
     /// The bytes of a blob, when it is here. One that was damaged on the disk is not.
     pub(crate) fn read(&self, hash: &BlobHash) -> Result<Option<Vec<u8>>, StoreError> {
+        if let Some(bytes) = read_bounded(&self.parts.join(hash.to_string()))?
+            && BlobHash::of(&bytes) == *hash
+        {
+            return Ok(Some(bytes));
+        }
         let path = self.path(hash);
         let Some(bytes) = read_bounded(&path)? else { return Ok(None) };
         if BlobHash::of(&bytes) != *hash {
@@ -127,15 +136,24 @@ impl BlobStore {
         fs::write(&part, bytes).map_err(at(&part))
     }
 
-    /// Ends a transfer: keeps the blob when it is `hash`, and forgets what came of it.
-    pub(super) fn finish(&self, hash: &BlobHash, bytes: &[u8]) -> Result<(), StoreError> {
+    /// Ends a transfer, and forgets what came of it: the bytes must be those of `hash`. They
+    /// are kept, unless whoever asked keeps them.
+    pub(super) fn finish(
+        &self,
+        hash: &BlobHash,
+        bytes: &[u8],
+        keep: Keep,
+    ) -> Result<(), StoreError> {
         let part = self.part(hash);
         let found = BlobHash::of(bytes);
         if found != *hash {
             remove(&part)?;
             return Err(StoreError::Hash { found, wanted: *hash });
         }
-        self.put(bytes)?;
+        match keep {
+            Keep::Here => drop(self.put(bytes)?),
+            Keep::Elsewhere => {}
+        }
         remove(&part)
     }
 
@@ -187,6 +205,15 @@ fn read_bounded(path: &Path) -> Result<Option<Vec<u8>>, StoreError> {
     let mut bytes = Vec::new();
     file.take(BLOB_BYTES_MAX).read_to_end(&mut bytes).map_err(at(path))?;
     Ok(Some(bytes))
+}
+
+/// Replaces `path` as a whole, by way of `temporary`.
+fn write_whole(temporary: &Path, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    let written = File::create(temporary).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.sync_all()
+    });
+    written.and_then(|()| fs::rename(temporary, path)).map_err(at(temporary))
 }
 
 fn remove(path: &Path) -> Result<(), StoreError> {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use sdr_core::id::RobotId;
+use sdr_core::{blob::BlobHash, id::RobotId};
 use sdr_files::RobotConfig;
 use sdr_files::robot::{Places, parse_robot};
 use sdr_keys::authority::Authority;
@@ -59,13 +59,13 @@ impl Bench {
         let socket = Mesh::open(config.mesh.listen).await.unwrap();
         let (sender, packets) = mpsc::channel(64);
         let (hint_sender, hints) = mpsc::channel(4);
-        let store = BlobStore::open(config.storage.state.join("blobs"), 4 << 20).unwrap();
+        let store = BlobStore::open(&config.storage.state, 4 << 20).unwrap();
         let streams = Streams::start(socket.clone(), packets, keys.clone(), store).unwrap();
         streams.follow_hints(hints);
         let address = socket.local_addr().unwrap();
         let sidings = Sidings { streams: sender, hints: hint_sender };
         let (inputs, _) = mpsc::channel(64);
-        let mesh = Mesh::start(socket, Some((keys, sidings)), inputs, trouble.clone());
+        let mesh = Mesh::start(socket, Some((keys, sidings)), None, inputs, trouble.clone());
         Robot { streams, trouble, address, _mesh: mesh }
     }
 
@@ -100,14 +100,14 @@ fn a_blob_comes_whole_and_stays() {
         let bytes = picture(700_000);
         let hash = one.streams.store().put(&bytes).unwrap();
 
-        let came = two.streams.fetch(one.address, hash, size(&bytes)).await.unwrap();
+        let came = two.streams.fetch(one.address, hash, size(&bytes), Keep::Here).await.unwrap();
 
         assert!(came == bytes);
         assert!(two.streams.store().read(&hash).unwrap().unwrap() == bytes);
         let other = BlobHash::of(b"nobody has this");
-        let error = two.streams.fetch(one.address, other, 15).await.unwrap_err();
+        let error = two.streams.fetch(one.address, other, 15, Keep::Here).await.unwrap_err();
         assert!(matches!(error, FetchError::Absent(_)), "{error}");
-        let error = two.streams.fetch(one.address, hash, 9).await.unwrap();
+        let error = two.streams.fetch(one.address, hash, 9, Keep::Here).await.unwrap();
         assert_eq!(error.len(), bytes.len(), "what is here needs nobody");
     });
 }
@@ -122,18 +122,18 @@ fn a_broken_transfer_goes_on_where_it_broke_and_wrong_bytes_are_forgotten() {
         let part = bench.part("robot-2", &hash);
 
         two.streams.store().keep_partial(&hash, &bytes[..299_999]).unwrap();
-        let came = two.streams.fetch(one.address, hash, size(&bytes)).await.unwrap();
+        let came = two.streams.fetch(one.address, hash, size(&bytes), Keep::Here).await.unwrap();
         assert!(came == bytes && !exists(&part));
 
         let other = picture(1000);
         let hash = one.streams.store().put(&other).unwrap();
         let part = bench.part("robot-2", &hash);
         two.streams.store().keep_partial(&hash, &[0; 500]).unwrap();
-        let error = two.streams.fetch(one.address, hash, 1000).await.unwrap_err();
+        let error = two.streams.fetch(one.address, hash, 1000, Keep::Here).await.unwrap_err();
         assert!(matches!(error, FetchError::Store(StoreError::Hash { .. })), "{error}");
         assert!(!exists(&part));
-        assert!(two.streams.fetch(one.address, hash, 1000).await.unwrap() == other);
-        let error = two.streams.fetch(one.address, BlobHash::of(b"x"), u64::MAX).await;
+        assert!(two.streams.fetch(one.address, hash, 1000, Keep::Here).await.unwrap() == other);
+        let error = two.streams.fetch(one.address, BlobHash::of(b"x"), u64::MAX, Keep::Here).await;
         assert!(matches!(error, Err(FetchError::Store(StoreError::TooLarge { .. }))));
     });
 }
@@ -151,7 +151,7 @@ fn the_denied_get_neither_blobs_nor_keys() {
         let have = *two.streams.keys.newest().borrow();
         let error = two.streams.fetch_key(one.address, have).await.unwrap_err();
         assert!(matches!(error, FetchError::Unreachable { .. }), "{error}");
-        let error = two.streams.fetch(one.address, hash, 6).await.unwrap_err();
+        let error = two.streams.fetch(one.address, hash, 6, Keep::Here).await.unwrap_err();
         assert!(matches!(error, FetchError::Unreachable { .. }), "{error}");
         assert!(one.trouble.counters()["certificates_refused"] >= 2);
     });
@@ -183,7 +183,7 @@ fn a_key_is_given_to_who_lacks_it() {
 #[test]
 fn the_quota_is_kept_and_the_newest_stay() {
     let folder = tempfile::tempdir().unwrap();
-    let store = BlobStore::open(folder.path().join("blobs"), 1000).unwrap();
+    let store = BlobStore::open(folder.path(), 1000).unwrap();
     let hashes: Vec<BlobHash> =
         (0..5_u8).map(|number| store.put(&[number; 300]).unwrap()).collect();
 

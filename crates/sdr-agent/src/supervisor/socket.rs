@@ -10,7 +10,7 @@ use std::{fs, os::unix::fs::PermissionsExt as _};
 use rustix::process::{Pid, getpgid, getuid};
 use sdr_component::protocol::{
     ErrorReport, FromComponent, Hello, LineBuffer, LineError, Order, PROTOCOL_VERSION, ToComponent,
-    encode_line,
+    encode_agent_line,
 };
 use thiserror::Error;
 use tokio::io::AsyncWriteExt as _;
@@ -193,6 +193,6 @@ pub(super) async fn receive(stream: &UnixStream, buffer: &mut LineBuffer) -> io:
 
 /// Sends one message.
 pub(super) async fn say(stream: &mut UnixStream, message: &ToComponent) -> io::Result<()> {
-    let line = encode_line(message).map_err(io::Error::other)?;
+    let line = encode_agent_line(message).map_err(io::Error::other)?;
     tokio::time::timeout(WRITE_MAX, stream.write_all(&line)).await?
 }

@@ -34,7 +34,9 @@ use sdr_core::{
     spec::{ComponentProfile, Execution, Value},
 };
 
-pub use line::{LINE_BYTES_MAX, LineBuffer, LineError, encode_line};
+pub use line::{
+    AGENT_LINE_BYTES_MAX, LINE_BYTES_MAX, LineBuffer, LineError, encode_agent_line, encode_line,
+};
 
 /// Version of this protocol, said in `hello` and `configure`.
 pub const PROTOCOL_VERSION: u32 = 1;

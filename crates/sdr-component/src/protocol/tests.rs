@@ -141,7 +141,7 @@ fn a_line_without_end_is_refused_at_the_bound() {
     buffer.push(&vec![b'x'; LINE_BYTES_MAX - 1]);
     assert!(buffer.next_message::<ToComponent>().unwrap().is_none());
     buffer.push(b"xx\n");
-    assert!(matches!(buffer.next_message::<ToComponent>(), Err(LineError::TooLong)));
+    assert!(matches!(buffer.next_message::<ToComponent>(), Err(LineError::TooLong { .. })));
 }
 
 proptest! {

@@ -183,7 +183,7 @@ impl Worker {
             profile: self.profile.clone(),
             now: self.outbox.connect(),
         })))?;
-        let mut lines = LineBuffer::default();
+        let mut lines = LineBuffer::of_agent();
         let mut closing: Option<Instant> = None;
         self.tell(News::Connected)?;
         loop {

@@ -4,6 +4,7 @@ use alloc::{boxed::Box, string::String, sync::Arc, vec::Vec};
 use core::{fmt, net::SocketAddr, time::Duration};
 
 use crate::{
+    blob::PART_BYTES_MAX,
     fitness::RolePolicy,
     id::RobotId,
     mesh::{Commons, MeshConfig},
@@ -42,6 +43,8 @@ pub struct BrainConfig {
     pub drain_max: Duration,
     /// How the holder of the coordinator role is chosen, until the fleet has a policy of its own.
     pub role_policy: RolePolicy,
+    /// Longest part of a system; less than a blob's where blobs cannot travel.
+    pub part_bytes_max: usize,
     /// How long the target of a move may take to get ready; default 30 s.
     pub prepare_max: Duration,
 }
@@ -62,6 +65,7 @@ impl BrainConfig {
             rejoin_wait: Duration::from_secs(2),
             drain_max: Duration::from_secs(1),
             role_policy: RolePolicy::default(),
+            part_bytes_max: PART_BYTES_MAX,
             prepare_max: Duration::from_secs(30),
         }
     }

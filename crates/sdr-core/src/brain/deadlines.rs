@@ -30,6 +30,7 @@ impl Brain {
             .chain(self.desk.store_at())
             .chain(self.desk_of_role.wake_at)
             .chain(self.lease.wake_at)
+            .chain(self.blobs.next_deadline())
             .chain(self.guard.wake_at)
             .chain(self.lost.wake_at)
             .chain(self.told.next_deadline())

@@ -193,6 +193,7 @@ impl Brain {
             | Input::RolePolicy { .. }
             | Input::Hold { .. }
             | Input::Planned { .. }
+            | Input::Fetched { .. }
             | Input::Stored { .. }
             | Input::StoreFailed { .. } => self.stir = Stir::ALL,
         }

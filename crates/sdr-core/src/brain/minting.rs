@@ -103,6 +103,11 @@ impl Desk {
         self.made.insert(key);
     }
 
+    /// Records made here that are not in the table yet.
+    pub(super) fn minted(&self) -> impl Iterator<Item = &FleetRecord> {
+        self.mints.iter().flat_map(|mint| &mint.records)
+    }
+
     /// When to try a broken disk again.
     pub(super) fn retry_at(&self) -> Option<Instant> {
         self.broken_at.map(|at| at + DISK_RETRY)
@@ -175,14 +180,15 @@ impl Brain {
             self.desk.peers.clone_from(peers);
         }
         let incarnation = self.mesh.incarnation().counter;
-        StoredChange { whole, incarnation, facts, dropped, runs, epochs, peers }
+        let blobs = self.blobs.unsaved(self.desk.last);
+        StoredChange { whole, incarnation, facts, dropped, runs, epochs, peers, blobs }
     }
 
     /// What is made here belongs on the disk before it is in the table.
     fn add_mints(&self, facts: &mut Vec<Arc<Fact>>, dropped: &mut Vec<FleetKey>) {
         let fleet = self.mesh.fleet();
         let mut minted = FleetTable::default();
-        for record in self.desk.mints.iter().flat_map(|mint| &mint.records) {
+        for record in self.desk.minted() {
             minted.merge(record.clone());
         }
         for fact in minted.facts().iter().filter(|fact| fleet.judge(fact) == Merge::News) {
@@ -198,6 +204,7 @@ impl Brain {
 
     pub(super) fn handle_stored(&mut self, ticket: StoreTicket) {
         self.desk.spoken = true;
+        self.blobs.saved(ticket);
         if self.desk.broken_at.take().is_some() {
             self.event("minting-resumed", "the disk takes what is decided again");
         }

@@ -11,6 +11,7 @@
 //! what should be on itself with what is. Nothing is ever told to another robot but records.
 
 mod adopt;
+mod blobs;
 mod conditions;
 mod config;
 mod deadlines;
@@ -35,6 +36,7 @@ mod minting;
 mod moves;
 mod newborn;
 mod news;
+mod parts;
 mod plans;
 mod policies;
 mod prepare;
@@ -75,6 +77,7 @@ use crate::{
     report::{ConditionReport, HostReport},
     time::{Duration, Instant},
 };
+use blobs::BlobDesk;
 use epochs::EpochBook;
 use guard::GuardDesk;
 use hold::Holds;
@@ -165,6 +168,7 @@ pub struct Brain {
     /// Homes that others chose lately: until when they have time to speak.
     homes_told: BTreeMap<ComponentKey, Instant>,
     desk: Desk,
+    blobs: BlobDesk,
     desk_of_role: RoleDesk,
     lease: Lease,
     holds: Holds,
@@ -239,11 +243,13 @@ impl Brain {
             left: BTreeMap::new(),
             homes_told: BTreeMap::new(),
             desk: Desk::default(),
+            blobs: BlobDesk::default(),
             desk_of_role: RoleDesk::default(),
             lease: Lease::default(),
             holds: Holds::default(),
             duplicates_told: BTreeSet::new(),
         });
+        brain.note_blobs(now);
         brain.read_latches();
         brain.refresh_all_systems();
         brain.say_facts();
@@ -283,6 +289,7 @@ impl Brain {
             Input::Told { question, result } => self.handle_told(now, question, result),
             Input::Hold { time } => self.announce_hold(time),
             Input::Planned { plan, result } => self.handle_planned(now, plan, result),
+            Input::Fetched { blob, result } => self.handle_fetched(now, blob, result),
             Input::Stored { ticket } => self.handle_stored(ticket),
             Input::StoreFailed { ticket, reason } => self.handle_store_failed(ticket, &reason),
         }
@@ -327,6 +334,7 @@ impl Brain {
     fn settle(&mut self, now: Instant) {
         self.mesh.handle_tick(now);
         self.take_news(now);
+        self.fetch_blobs(now);
         self.notice_time(now);
         self.consider_role(now);
         self.watch_homes(now);

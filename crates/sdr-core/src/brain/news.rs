@@ -66,6 +66,9 @@ impl Brain {
                 }
             }
         }
+        if changed.has_parts() {
+            self.note_blobs(now);
+        }
         self.refresh(&changed);
     }
 

@@ -3,11 +3,10 @@
 use alloc::{
     format,
     string::{String, ToString},
-    sync::Arc,
     vec::Vec,
 };
 
-use super::Brain;
+use super::{Brain, parts::Parts};
 use crate::{
     api::{Accepted, DeployAnswer},
     effect::Effect,
@@ -16,7 +15,7 @@ use crate::{
     input::RequestId,
     mesh::FleetRecord,
     order::Version,
-    record::{FleetValue, RECORD_BYTES_MAX, RecordKind, SystemRecord},
+    record::{FleetValue, RecordKind, SystemRecord},
     spec::SystemSpec,
 };
 
@@ -37,8 +36,8 @@ impl Brain {
         let settled = self.desk.revision_under_way(&name).is_none();
         let unchanged = settled
             && before.is_some_and(|revision| {
-                let records = self.records_of(&system, revision);
-                records.iter().all(|record| {
+                let parts = self.parts_of(&system, revision);
+                parts.records.iter().all(|record| {
                     record.key.kind == RecordKind::SYSTEM
                         || self
                             .mesh
@@ -60,20 +59,16 @@ impl Brain {
             self.effects.push_back(Effect::Answer { request, result: Ok(answer) });
             return;
         }
-        let records = self.records_of(&system, revision);
-        if let Some(long) = records.iter().find(|record| record.value.len() > RECORD_BYTES_MAX) {
-            let text = format!(
-                "{} takes {} bytes; a record has at most {RECORD_BYTES_MAX} (fewer or shorter parameters)",
-                long.key.name,
-                long.value.len()
-            );
-            return self.refuse(request, text);
+        let parts = self.parts_of(&system, revision);
+        if let Some(objection) = parts.objection(self.config.part_bytes_max) {
+            return self.refuse(request, objection);
         }
+        parts.large.into_iter().for_each(|part| self.blobs.keep(part));
         let text = format!("{name}, revision {revision}, {} components", system.components.len());
         let mut event = Event::new("deployed", &self.me, text);
         event.system = Some(name);
         self.push_event(event);
-        self.mint(records, Some((request, answer)));
+        self.mint(parts.records, Some((request, answer)));
     }
 
     pub(super) fn handle_undeploy(&mut self, request: RequestId, name: &Name) {
@@ -120,50 +115,8 @@ impl Brain {
         Version { epoch: None, revision, term: 0, author: self.me.clone() }
     }
 
-    /// A system as one small record per part; the system's own record comes first.
-    fn records_of(&self, system: &SystemSpec, revision: u64) -> Vec<FleetRecord> {
-        let count = |length: usize| u16::try_from(length).unwrap_or(u16::MAX);
-        let own = FleetValue::System(SystemRecord {
-            name: system.name.clone(),
-            receiver: self.me.clone(),
-            components: count(system.components.len()),
-            connections: count(system.connections.len()),
-            wanted: true,
-            since: self.systems.get(&system.name).map_or(revision, |before| before.since),
-        });
-        let mut parts = alloc::vec![
-            (RecordKind::SYSTEM, system.name.to_string(), own),
-            (
-                RecordKind::ALLOCATION,
-                system.name.to_string(),
-                FleetValue::Allocation(Arc::new(system.allocation.clone())),
-            ),
-            (
-                RecordKind::RECOVERY,
-                system.name.to_string(),
-                FleetValue::Recovery(Arc::new(system.recovery.clone())),
-            ),
-        ];
-        for (index, component) in system.components.iter().enumerate() {
-            let mut component = component.clone();
-            component.index = count(index);
-            let name = format!("{}/{}", system.name, component.name);
-            parts.push((RecordKind::COMPONENT, name, FleetValue::Component(Arc::new(component))));
-        }
-        for (index, connection) in system.connections.iter().enumerate() {
-            let mut connection = connection.clone();
-            connection.index = count(index);
-            let name = format!("{}/{index}", system.name);
-            parts.push((
-                RecordKind::CONNECTION,
-                name,
-                FleetValue::Connection(Arc::new(connection)),
-            ));
-        }
-        let version = self.deployment_version(revision);
-        parts
-            .into_iter()
-            .map(|(kind, name, value)| FleetRecord::new(kind, name, version.clone(), &value))
-            .collect()
+    fn parts_of(&self, system: &SystemSpec, revision: u64) -> Parts {
+        let since = self.systems.get(&system.name).map_or(revision, |before| before.since);
+        Parts::of(system, &self.me, since, &self.deployment_version(revision))
     }
 }

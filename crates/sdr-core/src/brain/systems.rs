@@ -58,6 +58,11 @@ pub(super) struct Changed {
 }
 
 impl Changed {
+    /// Whether parts of systems may be among it.
+    pub(super) fn has_parts(&self) -> bool {
+        !self.systems.is_empty()
+    }
+
     pub(super) fn note(&mut self, key: &FleetKey) {
         match key.kind {
             RecordKind::ASSIGNMENT => {
@@ -67,7 +72,10 @@ impl Changed {
             | RecordKind::COMPONENT
             | RecordKind::CONNECTION
             | RecordKind::ALLOCATION
-            | RecordKind::RECOVERY => {
+            | RecordKind::RECOVERY
+            | RecordKind::LARGE_COMPONENT
+            | RecordKind::LARGE_ALLOCATION
+            | RecordKind::LARGE_RECOVERY => {
                 let system = key.name.split('/').next().unwrap_or(&key.name);
                 self.systems.insert(system.into());
             }
@@ -156,23 +164,18 @@ impl Brain {
 
     fn assemble(&self, of: &Version, record: &SystemRecord) -> Option<SystemNow> {
         let fleet = self.mesh.fleet();
-        let policy = |kind| match fleet.get(kind, record.name.as_str()) {
-            Some((version, FleetValue::Allocation(policy) | FleetValue::Recovery(policy)))
-                if version == of =>
-            {
-                Some(Arc::clone(policy))
-            }
-            Some(_) | None => None,
-        };
-        let allocation = policy(RecordKind::ALLOCATION)?;
-        let recovery = policy(RecordKind::RECOVERY)?;
+        let allocation = self.policy_of(RecordKind::ALLOCATION, of, record)?;
+        let recovery = self.policy_of(RecordKind::RECOVERY, of, record)?;
         let prefix = format!("{}/", record.name);
         let current =
             |key: &FleetKey, version: &Version| key.name.starts_with(&prefix) && version == of;
         let mut components = Vec::new();
-        for (key, version, value) in fleet.below(RecordKind::COMPONENT, &prefix) {
-            if let (true, FleetValue::Component(spec)) = (current(key, version), value) {
-                components.push(Arc::clone(spec));
+        for kind in [RecordKind::COMPONENT, RecordKind::LARGE_COMPONENT] {
+            for (key, version, value) in fleet.below(kind, &prefix) {
+                let part = current(key, version).then(|| self.part(value)).flatten();
+                if let Some(FleetValue::Component(spec)) = part {
+                    components.push(Arc::clone(spec));
+                }
             }
         }
         let mut connections = Vec::new();
@@ -199,6 +202,49 @@ impl Brain {
             allocation,
             recovery,
         })
+    }
+
+    /// A policy of a system, from its record or its blob.
+    fn policy_of(
+        &self,
+        kind: RecordKind,
+        of: &Version,
+        record: &SystemRecord,
+    ) -> Option<Arc<PolicyBytes>> {
+        let kinds = [Some(kind), kind.large()].into_iter().flatten();
+        let found = kinds.filter_map(|kind| self.mesh.fleet().get(kind, record.name.as_str()));
+        let mut found = found.filter(|(version, _)| *version == of);
+        match found.find_map(|(_, value)| self.part(value))? {
+            FleetValue::Allocation(policy) | FleetValue::Recovery(policy) => {
+                Some(Arc::clone(policy))
+            }
+            FleetValue::System(_)
+            | FleetValue::Component(_)
+            | FleetValue::Connection(_)
+            | FleetValue::Assignment(_)
+            | FleetValue::Role(_)
+            | FleetValue::RolePolicy(_)
+            | FleetValue::Latch(_)
+            | FleetValue::Large(_)
+            | FleetValue::Unknown => None,
+        }
+    }
+
+    /// A part of a system, from its record or its blob; `None` while the blob is not here.
+    fn part<'a>(&'a self, value: &'a FleetValue) -> Option<&'a FleetValue> {
+        match value {
+            FleetValue::Large(name) => self.blobs.part(name),
+            FleetValue::System(_)
+            | FleetValue::Component(_)
+            | FleetValue::Connection(_)
+            | FleetValue::Allocation(_)
+            | FleetValue::Recovery(_)
+            | FleetValue::Assignment(_)
+            | FleetValue::Role(_)
+            | FleetValue::RolePolicy(_)
+            | FleetValue::Latch(_)
+            | FleetValue::Unknown => Some(value),
+        }
     }
 
     /// Where a component should run, as far as somebody decided it.

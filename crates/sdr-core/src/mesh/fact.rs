@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::wire::SECTION_BYTES_MAX;
 use crate::{
+    blob::BlobRef,
     order::{Version, hash64},
     record::{Assignment, FleetKey, FleetValue, RECORD_BYTES_MAX, RecordKind},
 };
@@ -110,6 +111,24 @@ impl Fact {
             | FleetValue::Role(_)
             | FleetValue::RolePolicy(_)
             | FleetValue::Latch(_)
+            | FleetValue::Large(_)
+            | FleetValue::Unknown => None,
+        }
+    }
+
+    /// The blob it names, when it names one.
+    pub fn large(&self) -> Option<&BlobRef> {
+        match &self.value {
+            FleetValue::Large(name) => Some(name),
+            FleetValue::System(_)
+            | FleetValue::Component(_)
+            | FleetValue::Connection(_)
+            | FleetValue::Allocation(_)
+            | FleetValue::Recovery(_)
+            | FleetValue::Assignment(_)
+            | FleetValue::Role(_)
+            | FleetValue::RolePolicy(_)
+            | FleetValue::Latch(_)
             | FleetValue::Unknown => None,
         }
     }
@@ -157,6 +176,14 @@ impl Facts {
     pub(super) fn from(&self, kind: RecordKind, name: &str) -> impl Iterator<Item = &Arc<Fact>> {
         let from = FleetKey { kind, name: String::from(name) };
         self.0.range(from..).map(|fact| &fact.0)
+    }
+
+    /// Blobs that they name, and what names them.
+    pub fn large(&self) -> impl Iterator<Item = (&Arc<Fact>, &BlobRef)> {
+        RecordKind::LARGE.into_iter().flat_map(|kind| {
+            let facts = self.from(kind, "").take_while(move |fact| fact.key().kind == kind);
+            facts.filter_map(|fact| Some((fact, fact.large()?)))
+        })
     }
 
     /// How many there are.

@@ -107,6 +107,7 @@ impl FleetTable {
             | FleetValue::Role(_)
             | FleetValue::RolePolicy(_)
             | FleetValue::Latch(_)
+            | FleetValue::Large(_)
             | FleetValue::Unknown => None,
         };
         if let Some(commons) = &self.commons {
@@ -163,6 +164,7 @@ impl FleetTable {
             | FleetValue::Assignment(_)
             | FleetValue::RolePolicy(_)
             | FleetValue::Latch(_)
+            | FleetValue::Large(_)
             | FleetValue::Unknown => None,
         }
     }
@@ -296,14 +298,8 @@ impl FleetTable {
 
     /// Parts of a system of versions before this one.
     pub fn parts_before(&self, system: &str, version: &Version) -> Vec<FleetKey> {
-        let kinds = [
-            RecordKind::COMPONENT,
-            RecordKind::CONNECTION,
-            RecordKind::ALLOCATION,
-            RecordKind::RECOVERY,
-        ];
         let mut outdated = Vec::new();
-        for kind in kinds {
+        for kind in RecordKind::PARTS {
             let parts = self.below(kind, system);
             let old = parts
                 .filter(|(key, known, _)| system_of_part(key) == Some(system) && *known < version);
@@ -376,12 +372,6 @@ impl FleetTable {
 
 /// The system whose part a record is.
 fn system_of_part(key: &FleetKey) -> Option<&str> {
-    let part = matches!(
-        key.kind,
-        RecordKind::COMPONENT
-            | RecordKind::CONNECTION
-            | RecordKind::ALLOCATION
-            | RecordKind::RECOVERY
-    );
+    let part = RecordKind::PARTS.contains(&key.kind);
     part.then(|| key.name.split('/').next().unwrap_or(&key.name))
 }

@@ -298,6 +298,11 @@ impl Mesh {
         self.authors.seat(robot).map_or(Permille(1000), |seat| self.links.noise(seat))
     }
 
+    /// Where `robot` was heard last.
+    pub fn address(&self, robot: &RobotId) -> Option<SocketAddr> {
+        self.peers.address(self.authors.seat(robot)?)
+    }
+
     /// Addresses heard so far.
     pub fn peer_addresses(&self) -> Vec<SocketAddr> {
         self.peers.addresses()

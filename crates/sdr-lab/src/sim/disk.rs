@@ -1,8 +1,13 @@
 //! The disk of one robot: takes its time, may be full, and a crash may come in between.
 
-use std::time::Duration;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+    time::Duration,
+};
 
 use sdr_core::{
+    blob::{Blob, BlobHash},
     effect::{StoredChange, StoredState},
     input::StoreTicket,
 };
@@ -27,6 +32,7 @@ impl Order {
 #[derive(Debug)]
 pub(crate) struct Disk {
     held: Option<StoredState>,
+    blobs: BTreeMap<BlobHash, Arc<Vec<u8>>>,
     /// Changes that did not get there: the next write brings them too.
     failed: Vec<StoredChange>,
     writing: Option<Order>,
@@ -41,6 +47,7 @@ impl Disk {
     pub(crate) fn new() -> Self {
         Self {
             held: None,
+            blobs: BTreeMap::new(),
             failed: Vec::new(),
             writing: None,
             waiting: None,
@@ -77,13 +84,36 @@ impl Disk {
 
     fn write(&mut self, order: Order, succeeds: bool) {
         if !self.is_read {
+            // others may ask for what is on it all the same
+            let changes = order.changes.into_iter().filter(|_| succeeds);
+            changes.for_each(|change| self.keep(change.blobs));
             return;
         }
         self.failed.extend(order.changes);
         if succeeds {
-            let held = self.held.get_or_insert_default();
-            self.failed.drain(..).for_each(|change| held.take(change));
+            for mut change in std::mem::take(&mut self.failed) {
+                self.keep(std::mem::take(&mut change.blobs));
+                self.held.get_or_insert_default().take(change);
+            }
+            self.sweep();
         }
+    }
+
+    fn keep(&mut self, blobs: Vec<Blob>) {
+        self.blobs.extend(blobs.into_iter().map(|blob| (blob.hash, blob.bytes)));
+    }
+
+    /// What the state does not name any more goes.
+    fn sweep(&mut self) {
+        if let (Some(held), false) = (&self.held, self.blobs.is_empty()) {
+            let named: BTreeSet<BlobHash> = held.blobs().collect();
+            self.blobs.retain(|hash, _| named.contains(hash));
+        }
+    }
+
+    /// A blob that is here.
+    pub(crate) fn blob(&self, hash: &BlobHash) -> Option<&Arc<Vec<u8>>> {
+        self.blobs.get(hash)
     }
 
     /// Power is lost; what was being written is there or not.

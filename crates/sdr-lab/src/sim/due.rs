@@ -8,7 +8,7 @@ use sdr_core::{
     recover::Cause,
 };
 
-use super::{Fault, Weather};
+use super::{Fault, Weather, fetch::Transfer};
 
 /// Something due.
 #[derive(Debug)]
@@ -18,6 +18,7 @@ pub(crate) enum Due {
     Input { robot: usize, life: u64, input: Input },
     Turn { robot: usize, life: u64, instance: InstanceId, turn: Turn },
     Stored { robot: usize, life: u64 },
+    Transfer(Transfer),
     Crash { robot: usize, life: u64, down: Option<Duration> },
     Start { robot: usize },
     Sample { robot: usize, life: u64 },

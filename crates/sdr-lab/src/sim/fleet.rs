@@ -149,6 +149,7 @@ impl Fleet {
                 self.turn(robot, instance, turn);
             }
             Due::Stored { robot, life } if self.lives(robot, life) => self.stored(robot),
+            Due::Transfer(transfer) => self.transferred(transfer),
             Due::Crash { robot, life, down } if self.lives(robot, life) => {
                 self.crash(robot, down, super::fault::DiskFate::Kept);
             }

@@ -24,6 +24,7 @@ mod draw;
 mod due;
 mod edition;
 mod fault;
+mod fetch;
 mod fleet;
 mod flow;
 mod measure;

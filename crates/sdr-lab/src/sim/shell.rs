@@ -36,6 +36,7 @@ impl Fleet {
             match effect {
                 Effect::Send { to, bytes } => self.send(number, number_of(to), bytes),
                 Effect::Store { ticket, change } => self.store(number, Order::new(ticket, change)),
+                Effect::Fetch { blob, from } => self.fetch(number, blob, &from),
                 Effect::Launch(order) => self.launch(number, *order),
                 Effect::Command { instance, command } => self.command(number, instance, command),
                 Effect::Routes(routes) => self.route(number, &routes),

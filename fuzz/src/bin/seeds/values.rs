@@ -73,6 +73,7 @@ pub fn talk() -> Vec<Vec<u8>> {
                     }
                     Effect::Launch(_)
                     | Effect::Ask(_)
+                    | Effect::Fetch { .. }
                     | Effect::Command { .. }
                     | Effect::Routes(_)
                     | Effect::Answer { .. }
