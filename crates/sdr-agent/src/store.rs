@@ -181,23 +181,20 @@ pub(crate) fn read(dir: &Path) -> io::Result<Remembered> {
     };
     match disk::decode(&bytes) {
         Ok(state) => Ok(Remembered::State(state)),
-        Err(reason) => {
-            let set_aside = free_name(dir);
-            fs::rename(&path, &set_aside)?;
-            Ok(Remembered::Corrupt { set_aside, reason })
-        }
+        Err(reason) => Ok(Remembered::Corrupt { set_aside: set_aside(&path)?, reason }),
     }
 }
 
-fn free_name(dir: &Path) -> PathBuf {
-    let mut number = 1_u64;
-    loop {
-        let path = dir.join(format!("state.corrupt-{number}"));
-        if !path.exists() {
-            return path;
-        }
-        number += 1;
-    }
+/// Gives a file that cannot be read another name, which nobody uses; the name.
+pub(crate) fn set_aside(path: &Path) -> io::Result<PathBuf> {
+    let name = |number: u64| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(format!(".corrupt-{number}"));
+        PathBuf::from(name)
+    };
+    let free = (1..).map(name).find(|name| !name.exists()).expect("numbers do not end");
+    fs::rename(path, &free)?;
+    Ok(free)
 }
 
 fn write(dir: &Path, state: &StoredState) -> io::Result<()> {

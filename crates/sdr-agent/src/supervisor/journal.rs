@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::keepsake::Keepsake;
 use crate::metrics::process::parse_start_time;
+use crate::store;
 
 const FILE_NAME: &str = "processes.json";
 
@@ -92,19 +93,48 @@ impl Journal {
     }
 }
 
-/// What the predecessor left in `dir`; nothing when it left no list, or no readable one.
-pub(super) fn read(dir: &Path) -> Vec<Entry> {
+/// What a predecessor left.
+#[derive(Debug, Default)]
+pub(super) struct Left {
+    /// As far as it can be read.
+    pub(super) entries: Vec<Entry>,
+    /// What is wrong with its list, and where the list was put aside.
+    pub(super) trouble: Option<String>,
+}
+
+/// What the predecessor left in `dir`; nothing when it left no list.
+pub(super) fn read(dir: &Path) -> Left {
     let path = dir.join(FILE_NAME);
-    let Ok(text) = fs::read_to_string(&path) else { return Vec::new() };
-    let complain = |error: serde_json::Error| {
-        tracing::error!(event = "journal-unreadable", path = %path.display(), %error);
+    let text = match fs::read(&path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Left::default(),
+        Err(error) => {
+            let trouble = Some(format!("{}: {error}", path.display()));
+            return Left { entries: Vec::new(), trouble };
+        }
     };
-    let entries: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap_or_else(|error| {
-        complain(error);
-        Vec::new()
+    let (entries, wrong) = parse(&text);
+    let trouble = wrong.map(|wrong| match store::set_aside(&path) {
+        Ok(kept) => format!("{wrong}; kept as {}", kept.display()),
+        Err(error) => format!("{wrong}; {} could not be kept: {error}", path.display()),
     });
-    let entry = |value| serde_json::from_value(value).map_err(complain).ok();
-    entries.into_iter().filter_map(entry).collect()
+    Left { entries, trouble }
+}
+
+/// The entries that can be read, and what is wrong with the others.
+fn parse(text: &[u8]) -> (Vec<Entry>, Option<String>) {
+    let values: Vec<serde_json::Value> = match serde_json::from_slice(text) {
+        Ok(values) => values,
+        Err(error) => return (Vec::new(), Some(format!("no list of processes: {error}"))),
+    };
+    let (mut entries, mut wrong) = (Vec::new(), None);
+    for (number, value) in values.into_iter().enumerate() {
+        match serde_json::from_value(value) {
+            Ok(entry) => entries.push(entry),
+            Err(error) => wrong = Some(format!("entry {}: {error}", number + 1)),
+        }
+    }
+    (entries, wrong)
 }
 
 fn write(path: &Path, entries: &[Entry]) -> io::Result<()> {

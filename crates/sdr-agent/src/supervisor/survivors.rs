@@ -15,7 +15,7 @@ use rustix::process::{Pid, PidfdFlags, Signal, getpgid, pidfd_open};
 use sdr_component::protocol::ENV_BADGE;
 use sdr_core::{effect::LaunchOrder, event::Event, spec::OnAgentDeath};
 
-use super::journal::{self, Entry};
+use super::journal::{self, Entry, Left};
 use super::keepsake::Keepsake;
 use super::{SupervisorConfig, pidfd};
 use crate::clock;
@@ -54,7 +54,14 @@ pub(crate) fn find(config: &SupervisorConfig, events: &Events) -> Vec<Survivor> 
     let boot_id = journal::boot_id();
     let mut survivors = Vec::new();
     let mut leftovers = Vec::new();
-    for entry in journal::read(&config.state) {
+    let Left { entries, trouble } = journal::read(&config.state);
+    if let Some(trouble) = trouble {
+        tracing::error!(event = "processes-corrupt", %trouble);
+        let said =
+            format!("{trouble}; what runs and is not in it is told to finish when it greets");
+        events.publish(events.new_event("processes-corrupt", said));
+    }
+    for entry in entries {
         // What another boot started ended with it.
         if entry.boot_id != boot_id {
             continue;

@@ -226,7 +226,7 @@ fn a_component_is_configured_commanded_and_finished() {
         bench.supervisor.command(1, Command::Finish);
         assert!(bench.until_exit(1).await.starts_with("exit status 0"));
         assert!(bench.supervisor.shared.kept.borrow().is_empty());
-        assert!(journal::read(bench.dir.path()).is_empty());
+        assert!(journal::read(bench.dir.path()).entries.is_empty());
     });
 }
 
@@ -381,7 +381,7 @@ fn stopping_ends_all_components_deaf_ones_too() {
                 usize::from(matches!(news, InstanceNews::State { state, .. } if state == inactive));
         }
         let pids: Vec<u32> =
-            journal::read(bench.dir.path()).iter().map(|entry| entry.pid).collect();
+            journal::read(bench.dir.path()).entries.iter().map(|entry| entry.pid).collect();
         assert_eq!(pids.len(), 2);
 
         bench.supervisor.stop(Whom::All).await;

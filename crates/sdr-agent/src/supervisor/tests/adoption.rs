@@ -15,7 +15,7 @@ fn die_over(manner: &str) -> (TempDir, u32) {
         bench.launch_component(1, manner);
         bench.supervisor.command(1, Command::Activate(token(4)));
         bench.until_state(1, LifecycleState::Active).await;
-        let pid = journal::read(bench.dir.path())[0].pid;
+        let pid = journal::read(bench.dir.path()).entries[0].pid;
         (bench.dir, pid)
     })
 }
@@ -180,4 +180,47 @@ fn a_process_without_the_journals_badge_is_ended() {
 fn a_component_that_is_to_stop_is_not_adopted() {
     let (dir, _) = die_over("waiting");
     assert_ended(dir, "to end with its agent");
+}
+
+#[test]
+fn a_list_that_cannot_be_read_is_kept_aside_and_told() {
+    let (dir, pid) = die_over("loyal");
+    let list = dir.path().join("processes.json");
+    let half = b"[{\"component\": \"mapp";
+    fs::write(&list, half).unwrap();
+    run(async {
+        let bench = Bench::again(dir);
+
+        assert!(bench.adopted.is_empty());
+        let said = bench.events.since(0);
+        let kept = bench.dir.path().join("processes.json.corrupt-1");
+        assert_eq!(said.len(), 1, "{said:?}");
+        assert_eq!(said[0].event.kind, "processes-corrupt");
+        assert!(said[0].event.reason.contains(&kept.display().to_string()), "{said:?}");
+        assert_eq!(fs::read(kept).unwrap(), half);
+    });
+    end(pid);
+}
+
+#[test]
+fn what_can_be_read_of_a_list_is_adopted_and_the_list_kept_aside() {
+    let (dir, pid) = die_over("loyal");
+    let list = dir.path().join("processes.json");
+    let mut entries: Vec<Json> = serde_json::from_slice(&fs::read(&list).unwrap()).unwrap();
+    entries.push(serde_json::json!({ "process": "of a version that wrote otherwise" }));
+    fs::write(&list, serde_json::to_vec(&entries).unwrap()).unwrap();
+    run(async {
+        let bench = Bench::again(dir);
+
+        assert_eq!(bench.adopted.len(), 1);
+        let said = bench.events.since(0);
+        assert_eq!(said.len(), 1, "{said:?}");
+        assert!(said[0].event.reason.starts_with("entry 2: "), "{said:?}");
+        let kept: Vec<Json> = serde_json::from_slice(
+            &fs::read(bench.dir.path().join("processes.json.corrupt-1")).unwrap(),
+        )
+        .unwrap();
+        assert_eq!(kept, entries);
+    });
+    end(pid);
 }
