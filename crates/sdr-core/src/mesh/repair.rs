@@ -38,6 +38,9 @@ const ROSTER_DOUBTS: u8 = 3;
 const STAMPS_TOLD_MAX: usize = 250;
 /// Fleet tables are compared only when this one did not change for so long.
 const CALM: Duration = Duration::from_millis(1200);
+/// While one change follows the other, they are compared so often all the same: what is lacking
+/// may be the very thing that ends the changes.
+const RESTLESS: Duration = Duration::from_secs(3);
 /// A comparison goes on so long after the last records came.
 const PACE: Duration = Duration::from_millis(100);
 /// A comparison that does not go on for so long is given up.
@@ -83,6 +86,8 @@ pub(super) struct Repair {
     session: Option<Session>,
     unfinished: bool,
     changed_at: Option<Instant>,
+    /// Since when changes come without a calm between them, or the last comparison since.
+    restless_since: Option<Instant>,
 }
 
 impl Repair {
@@ -101,7 +106,14 @@ impl Repair {
 
     /// The fleet table has news.
     pub(super) fn note_change(&mut self, now: Instant) {
+        if self.is_calm(now) {
+            self.restless_since = Some(now);
+        }
         self.changed_at = Some(now);
+    }
+
+    fn is_calm(&self, now: Instant) -> bool {
+        self.changed_at.is_none_or(|at| now.since(at) >= CALM)
     }
 
     /// Whether others know the same robots by name, as far as can be told.
@@ -208,6 +220,7 @@ impl Mesh {
                 moved: false,
                 moved_at: self.clock,
             });
+            self.repair.restless_since = Some(self.clock);
             answer.push(self.root_nodes());
         }
         if theirs.roster == self.authors.hash() {
@@ -228,8 +241,10 @@ impl Mesh {
     }
 
     fn may_compare(&self) -> bool {
-        let calm = self.repair.changed_at.is_none_or(|at| self.clock.since(at) >= CALM);
-        self.repair.session.is_none() && (calm || self.repair.unfinished)
+        let repair = &self.repair;
+        let restless = repair.restless_since.is_some_and(|at| self.clock.since(at) >= RESTLESS);
+        let due = repair.is_calm(self.clock) || restless || repair.unfinished;
+        repair.session.is_none() && due
     }
 
     fn root_nodes(&self) -> Section {

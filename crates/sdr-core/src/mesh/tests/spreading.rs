@@ -184,3 +184,20 @@ fn what_was_undeployed_behind_a_split_is_gone_everywhere_after_it() {
     let lengths: Vec<usize> = (0..3).map(|number| bench.mesh(number).fleet().len()).collect();
     assert_eq!(lengths, [2, 2, 2]);
 }
+
+#[test]
+fn what_is_lacking_arrives_while_something_else_changes_all_the_time() {
+    let mut bench = Bench::new(2, 0);
+    bench.run(Duration::from_secs(2));
+    bench.silence(1);
+    bench.mesh(0).publish(vec![role(0, 5)]);
+    bench.run(Duration::from_secs(2));
+    bench.cut.clear();
+
+    for revision in 1..=100 {
+        bench.mesh(1).publish(vec![system(revision, true, 1)]);
+        bench.run(Duration::from_millis(100));
+    }
+
+    assert_eq!(bench.mesh(1).fleet().role().map(|role| role.term), Some(5));
+}
