@@ -21,6 +21,7 @@ use crate::{
     event::Event,
     id::{ComponentKey, Name, RobotId},
     input::PlanId,
+    lifecycle::LifecycleState,
     recover::{Cause, Remedy},
     report::ConditionReport,
     spec::ComponentSpec,
@@ -181,7 +182,7 @@ impl Brain {
     }
 
     /// Robots a component must not go to: those that are in trouble of their own, and those
-    /// it left not long ago.
+    /// it left not long ago, unless it runs nowhere and no other could take it.
     pub(super) fn avoid(
         &self,
         now: Instant,
@@ -200,13 +201,22 @@ impl Brain {
                     list.push((robot.clone(), condition.cause.to_string()));
                 }
             }
-            for ((key, robot), until) in &self.left {
-                if *key == system.key(name) && now < *until {
+            let key = system.key(name);
+            let stranded = self.is_stranded(&key);
+            for ((of, robot), until) in &self.left {
+                if *of == key && now < *until && !stranded {
                     list.push((robot.clone(), String::from("left it not long ago")));
                 }
             }
         }
         avoid
+    }
+
+    /// Whether a component runs nowhere, and the last answer named no robot that could take it.
+    fn is_stranded(&self, key: &ComponentKey) -> bool {
+        let runs = self.home(key).and_then(|home| self.instance_report(home, key));
+        let runs = runs.is_some_and(|report| report.state == LifecycleState::Active);
+        !runs && self.plans.refusals.contains_key(key)
     }
 
     /// Robots on which the system's own recovery would act at once.
@@ -243,7 +253,7 @@ impl Brain {
 
     fn adopt(&mut self, now: Instant, asked: &Asked, plan: &Plan) {
         if let Purpose::Standby(_) = asked.purpose {
-            return self.back_up(asked, plan);
+            return self.back_up(now, asked, plan);
         }
         let foreseen = matches!(asked.purpose, Purpose::Prepare { .. });
         // nothing is missed yet of what is only foreseen, so nothing is said of it

@@ -159,10 +159,13 @@ impl Brain {
         let known = self.mesh.take_change().filter(|_| self.desk.told);
         self.desk.told = true;
         let whole = known.is_none();
-        let TableChange { mut facts, mut dropped } = known.unwrap_or_else(|| TableChange {
-            facts: self.mesh.fleet().facts().iter().cloned().collect(),
-            dropped: Vec::new(),
-        });
+        let TableChange { mut facts, mut dropped } = match known {
+            Some(mut change) => {
+                self.keep_editions(&mut change);
+                change
+            }
+            None => TableChange { facts: self.whole_editions(), dropped: Vec::new() },
+        };
         self.add_mints(&mut facts, &mut dropped);
         facts.retain(|fact| is_stored(fact.key().kind));
         let runs = self.runs.iter().filter(|(_, book)| whole || book.stored < book.reserved);

@@ -14,6 +14,7 @@ mod conditions;
 mod config;
 mod deadlines;
 mod decide;
+mod editions;
 mod effects;
 mod epochs;
 mod evidence;
@@ -69,6 +70,7 @@ use crate::{
     report::{ConditionReport, HostReport},
     time::{Duration, Instant},
 };
+use editions::Editions;
 use epochs::EpochBook;
 use guard::GuardDesk;
 use index::{Index, Stir};
@@ -143,6 +145,8 @@ pub struct Brain {
     spare_plans: BTreeMap<ComponentKey, SparePlan>,
     epochs: BTreeMap<ComponentKey, EpochBook>,
     guard: GuardDesk,
+    /// When this robot listed standbys of a component, not long ago.
+    listed: BTreeMap<ComponentKey, Instant>,
     /// Components that wish for a standby on another robot, and why none takes it.
     unbacked: BTreeMap<ComponentKey, alloc::vec::Vec<Refusal>>,
 
@@ -152,6 +156,7 @@ pub struct Brain {
     /// Homes that others chose lately: until when they have time to speak.
     homes_told: BTreeMap<ComponentKey, Instant>,
     desk: Desk,
+    editions: Editions,
     desk_of_role: RoleDesk,
     lease: Lease,
     duplicates_told: BTreeSet<core::net::SocketAddr>,
@@ -216,12 +221,14 @@ impl Brain {
             spare_plans: BTreeMap::new(),
             epochs: epochs.collect(),
             guard: GuardDesk::default(),
+            listed: BTreeMap::new(),
             unbacked: BTreeMap::new(),
             plans: PlanDesk::default(),
             moves: BTreeMap::new(),
             left: BTreeMap::new(),
             homes_told: BTreeMap::new(),
             desk: Desk::default(),
+            editions: Editions::default(),
             desk_of_role: RoleDesk::default(),
             lease: Lease::default(),
             duplicates_told: BTreeSet::new(),

@@ -27,8 +27,12 @@ use crate::{
     record::Assignment,
     report::ConditionReport,
     spec::{ComponentSpec, StandbyKind, StandbyWhere},
-    time::Instant,
+    time::{Duration, Instant},
 };
+
+/// Two coordinators that know different things would undo each other's lists as fast as they
+/// can write, and drown the news that tells them: each waits so long before it does it again.
+const RIVAL_PAUSE: Duration = Duration::from_secs(3);
 
 impl Brain {
     pub(super) fn spec_of(&self, key: &ComponentKey) -> Option<&ComponentSpec> {
@@ -126,8 +130,9 @@ impl Brain {
 
     /// Asks for standbys that are wished for and not there; true when something was done.
     pub(super) fn ask_for_standbys(&mut self, now: Instant, system: &SystemNow) -> bool {
-        let keys: Vec<ComponentKey> =
-            system.keys().filter(|key| self.index.backed.contains(key)).collect();
+        self.listed.retain(|_, at| now < *at + RIVAL_PAUSE);
+        let keys = system.keys().filter(|key| self.index.backed.contains(key));
+        let keys: Vec<ComponentKey> = keys.filter(|key| self.may_list(system, key)).collect();
         if self.tidy_standbys(now, &keys) {
             return true;
         }
@@ -139,6 +144,23 @@ impl Brain {
             }
         }
         false
+    }
+
+    /// Whether this robot knows enough to list standbys of a component: its edition is that of
+    /// the list, or a newer one, and nobody just undid what it listed.
+    fn may_list(&self, system: &SystemNow, key: &ComponentKey) -> bool {
+        self.wanted(key).is_some_and(|(version, assignment)| {
+            let undone = version.author != self.me && self.listed.contains_key(key);
+            assignment.deployment <= system.revision && !undone
+        })
+    }
+
+    /// The assignment of a component with other standbys.
+    fn with_standbys(&self, key: &ComponentKey, standbys: Vec<RobotId>) -> Option<FleetRecord> {
+        let (version, assignment) = self.wanted(key)?;
+        let deployment = self.systems.get(&key.system)?.revision;
+        let value = Assignment { standbys, deployment, ..assignment.clone() };
+        Some(record(key, self.next_revision(key, version), value))
     }
 
     /// Whether a running component wishes for one more standby on that side.
@@ -168,11 +190,11 @@ impl Brain {
     fn tidy_standbys(&mut self, now: Instant, keys: &[ComponentKey]) -> bool {
         let mut records: Vec<FleetRecord> = Vec::new();
         for key in keys {
-            let Some((version, assignment)) = self.wanted(key) else { continue };
+            let Some((_, assignment)) = self.wanted(key) else { continue };
             let proper = self.proper_standbys(now, key, assignment);
             if proper != assignment.standbys {
-                let value = Assignment { standbys: proper, ..assignment.clone() };
-                records.push(record(key, self.next_revision(key, version), value));
+                records.extend(self.with_standbys(key, proper));
+                self.listed.insert(key.clone(), now);
             }
         }
         self.mint_some(records)
@@ -240,7 +262,7 @@ impl Brain {
     }
 
     /// Lists what the allocator found, and says what it did not find.
-    pub(super) fn back_up(&mut self, asked: &Asked, plan: &Plan) {
+    pub(super) fn back_up(&mut self, now: Instant, asked: &Asked, plan: &Plan) {
         for homeless in &plan.homeless {
             self.say_unbacked(homeless);
         }
@@ -248,10 +270,11 @@ impl Brain {
         for placement in &plan.placements {
             let key = &placement.component;
             self.unbacked.remove(key);
-            let Some((version, assignment)) = self.wanted(key) else { continue };
-            let mut value = assignment.clone();
-            value.standbys.push(placement.robot.clone());
-            records.push(record(key, self.next_revision(key, version), value));
+            let Some((_, assignment)) = self.wanted(key) else { continue };
+            let mut standbys = assignment.standbys.clone();
+            standbys.push(placement.robot.clone());
+            records.extend(self.with_standbys(key, standbys));
+            self.listed.insert(key.clone(), now);
             let text = format!("on {}: {}", placement.robot, placed_reason(asked, placement));
             self.event_about("standby-placed", key, text);
         }

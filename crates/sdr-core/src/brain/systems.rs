@@ -120,8 +120,12 @@ impl Brain {
         let whole = wanted.then(|| self.assemble(version, record)).flatten();
         let before = self.systems.get(&name).cloned();
         if wanted && whole.is_none() {
+            if before.is_some() {
+                self.editions.begin(name.as_str());
+            }
             return;
         }
+        self.editions.end(name.as_str());
         let redeployed = matches!(
             (&before, &whole), (Some(old), Some(new)) if old.version != new.version
         );
