@@ -10,6 +10,8 @@ use super::{
 
 /// Faults of a component's own, at most: its ladder must not end in `hold`.
 const KILLS_MAX: usize = 3;
+/// Share of the runs in whose systems components wish for standbys.
+const STANDBYS: f64 = 0.35;
 
 /// A drawn run: the fleet, and what happens to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,7 +47,9 @@ impl Scenario {
             incidents: Vec::new(),
             calm_after,
         };
-        let mut draw = Draw { robots, calm_after, kills: 0, for_good: false, chance };
+        let mut backing = Chance::stream(seed, 11);
+        let backing = backing.happens(STANDBYS).then_some(backing);
+        let mut draw = Draw { robots, calm_after, kills: 0, for_good: false, chance, backing };
         scenario.incidents = draw.incidents();
         scenario
     }
@@ -104,6 +108,8 @@ struct Draw {
     kills: usize,
     for_good: bool,
     chance: Chance,
+    /// Draws standbys, apart from all else; `None`: nothing wishes for any.
+    backing: Option<Chance>,
 }
 
 impl Draw {
@@ -239,6 +245,10 @@ impl Draw {
     /// A system in one of its editions: other needs, other length, other policy.
     fn deploy(&mut self, number: usize) -> Fault {
         let robot = self.chance.below(self.robots);
-        Fault::Deploy { robot, system: Box::new(edition::system(&mut self.chance, number)) }
+        let mut system = edition::system(&mut self.chance, number);
+        if let Some(chance) = &mut self.backing {
+            edition::back_up(chance, &mut system);
+        }
+        Fault::Deploy { robot, system: Box::new(system) }
     }
 }

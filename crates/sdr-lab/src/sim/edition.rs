@@ -5,7 +5,10 @@ use std::time::Duration;
 use sdr_core::{
     fitness::{Alone, RoleBars, RolePolicy, RoleWeights},
     id::{Name, RobotId},
-    spec::{Isolation, IsolationAction, Needs, PolicyBytes, SystemSpec},
+    spec::{
+        Isolation, IsolationAction, Needs, PolicyBytes, Standby, StandbyKind, StandbyWhere,
+        SystemSpec,
+    },
     units::{Bytes, Permille},
 };
 
@@ -53,6 +56,26 @@ fn lease(chance: &mut Chance, system: &mut SystemSpec) {
     let first = chance.below(system.components.len());
     for component in &mut system.components[first..] {
         component.on_isolation = Isolation { action: IsolationAction::Deactivate, after };
+    }
+}
+
+/// Some of its components wish for standbys: hot or cold, on their own robot or elsewhere.
+pub(crate) fn back_up(chance: &mut Chance, system: &mut SystemSpec) {
+    for component in &mut system.components {
+        if chance.happens(0.4) {
+            continue;
+        }
+        let place = match chance.below(4) {
+            0 => StandbyWhere::SameRobot,
+            1 => StandbyWhere::Any,
+            _ => StandbyWhere::OtherRobot,
+        };
+        let kind = match chance.happens(0.7) {
+            true => StandbyKind::Hot,
+            false => StandbyKind::Cold,
+        };
+        let count = 1 + u8::from(chance.happens(0.3));
+        component.standby = Standby { count, place, kind, ..Standby::default() };
     }
 }
 

@@ -1,12 +1,12 @@
 //! What is so, whatever the robots believe: who can hear whom, who runs what.
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::BTreeSet, sync::Arc, time::Duration};
 
 use sdr_core::{
     id::ComponentKey,
     mesh::{Fact, FleetTable},
     record::{FleetValue, RecordKind},
-    spec::{ComponentSpec, IsolationAction},
+    spec::{ComponentSpec, IsolationAction, StandbyKind},
     time::Instant,
     units::Bytes,
 };
@@ -133,6 +133,44 @@ impl Fleet {
         wanted
     }
 
+    /// Whether these robots hold all parts of the revision of `system` that the greatest of
+    /// their tables wants: before, nobody there can know what to run.
+    pub fn is_whole(&self, system: &str, robots: &[usize]) -> bool {
+        let tables = || robots.iter().take(SPEAKERS).filter_map(|robot| self.table(*robot));
+        let records = tables().filter_map(|table| table.get(RecordKind::SYSTEM, system));
+        let Some((version, FleetValue::System(record))) =
+            records.max_by_key(|(version, _)| *version)
+        else {
+            return false;
+        };
+        if !record.wanted {
+            return true;
+        }
+        let held = |kind, name: &str| -> usize {
+            let parts = tables().flat_map(|table| table.below(kind, name));
+            let parts = parts.filter(|(_, part, _)| *part == version).map(|(key, ..)| &key.name);
+            parts.collect::<BTreeSet<_>>().len()
+        };
+        let policy = |kind| {
+            let mut held = tables().filter_map(|table| table.get(kind, system));
+            held.any(|(part, _)| part == version)
+        };
+        let prefix = format!("{system}/");
+        held(RecordKind::COMPONENT, &prefix) >= usize::from(record.components)
+            && held(RecordKind::CONNECTION, &prefix) >= usize::from(record.connections)
+            && policy(RecordKind::ALLOCATION)
+            && policy(RecordKind::RECOVERY)
+    }
+
+    /// Whether no robot holds anything that the fleet ever agreed on, running or on disk: from
+    /// here on it is a new fleet.
+    pub fn remembers_nothing(&self) -> bool {
+        self.robots.iter().all(|robot| {
+            let stored = robot.disk.held().is_none_or(|stored| stored.fleet.is_empty());
+            stored && robot.brain().is_none_or(|brain| brain.mesh().fleet().len() == 0)
+        })
+    }
+
     /// Whether one of these robots may and can run a component beside what it runs now.
     pub fn is_feasible(&self, key: &ComponentKey, side: &[usize]) -> bool {
         let Some(spec) = self.spec(key, side) else { return false };
@@ -150,6 +188,12 @@ impl Fleet {
     pub fn lease(&self, key: &ComponentKey, side: &[usize]) -> Option<Duration> {
         let isolation = self.spec(key, side)?.on_isolation;
         (isolation.action == IsolationAction::Deactivate).then_some(isolation.after)
+    }
+
+    /// How many standbys a component wishes for, and whether they are hot.
+    pub fn standbys(&self, key: &ComponentKey, side: &[usize]) -> Option<(bool, usize)> {
+        let wish = &self.spec(key, side)?.standby;
+        Some((wish.kind == StandbyKind::Hot, usize::from(wish.count)))
     }
 
     /// The latest spec of a component that these robots hold.

@@ -2,7 +2,7 @@
 
 use std::{fmt, time::Duration};
 
-use sdr_core::spec::{IsolationAction, SystemSpec};
+use sdr_core::spec::{IsolationAction, Standby, SystemSpec};
 
 use super::{Behaviour, ClockFate, DiskFate, Fault, Way};
 
@@ -86,6 +86,10 @@ fn deployed(robot: usize, system: &SystemSpec) -> String {
     let leased = leased.filter(|isolation| isolation.action == IsolationAction::Deactivate);
     if let Some(lease) = leased.map(|isolation| isolation.after).max() {
         text.push_str(&format!(", leases of {}", seconds(lease)));
+    }
+    for component in system.components.iter().filter(|component| component.standby.count > 0) {
+        let Standby { count, place, kind, .. } = &component.standby;
+        text.push_str(&format!(", {count} {kind:?} {place:?} for {}", component.name));
     }
     text
 }

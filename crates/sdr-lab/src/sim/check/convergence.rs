@@ -27,6 +27,7 @@ pub fn lacking(fleet: &Fleet) -> Option<String> {
         .or_else(|| equal_tables(fleet, &on))
         .or_else(|| each_once(fleet, &on))
         .or_else(|| latest_edition(fleet, &on))
+        .or_else(|| standbys_ready(fleet, &on))
         .or_else(|| known_to_all(fleet, &on))
         .or_else(|| all_heard(fleet))
 }
@@ -118,6 +119,34 @@ fn latest_edition(fleet: &Fleet, on: &[usize]) -> Option<String> {
             };
             if spec.needs != process.needs {
                 return Some(format!("{key} runs an old edition on robot-{}", robot + 1));
+            }
+        }
+    }
+    None
+}
+
+/// Who is listed for a hot standby has it, ready and inactive, and nobody else has one.
+fn standbys_ready(fleet: &Fleet, on: &[usize]) -> Option<String> {
+    let table = fleet.table(*on.first()?)?;
+    for key in fleet.wanted(on) {
+        let found = table.get(RecordKind::ASSIGNMENT, &key.to_string());
+        let Some((_, FleetValue::Assignment(assignment))) = found else { continue };
+        let (hot, count) = fleet.standbys(&key, on)?;
+        if assignment.standbys.len() > count {
+            return Some(format!("{key} has {} standbys, not {count}", assignment.standbys.len()));
+        }
+        for robot in on {
+            let id = &fleet.robots[*robot].id;
+            let target = assignment.target.as_ref() == Some(id);
+            let stands_by = target || (hot && assignment.standbys.contains(id));
+            let wanted = usize::from(stands_by) + usize::from(assignment.home == *id);
+            let processes = fleet.robots[*robot].processes().filter(|(_, of)| of.component == key);
+            let states: Vec<LifecycleState> = processes.map(|(_, of)| of.state).collect();
+            let sound = |state: &LifecycleState| {
+                matches!(state, LifecycleState::Active | LifecycleState::Inactive)
+            };
+            if states.len() != wanted || !states.iter().all(sound) {
+                return Some(format!("{id} has {states:?} of {key}, not {wanted} processes"));
             }
         }
     }

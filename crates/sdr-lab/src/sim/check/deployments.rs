@@ -53,7 +53,10 @@ impl Deployments {
         for (system, (revision, holders)) in &mut self.accepted {
             for robot in (0..fleet.robots.len()).filter(|robot| fleet.robots[*robot].is_on()) {
                 if revision_of(fleet, robot, system) >= *revision {
-                    holders.insert(robot);
+                    // a part of it is nothing that others could begin with
+                    if fleet.is_whole(system, &[robot]) {
+                        holders.insert(robot);
+                    }
                 } else if holders.contains(&robot) {
                     let what = format!("robot-{} forgot {system} revision {revision}", robot + 1);
                     found = Some(Broken::new("deployment-lost", what));

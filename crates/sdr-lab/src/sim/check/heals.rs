@@ -11,10 +11,23 @@ use crate::sim::{ActiveProcess, Broken, Checker, Fleet, Sight};
 
 /// So long after a heal, with nothing else going wrong, the same processes must be active.
 const SETTLED: Duration = Duration::from_secs(12);
+/// Until then after a heal, a robot may decide by what it knew before it: its first datagrams
+/// from the other side are still to come.
+const HEARS_WITHIN: Duration = Duration::from_secs(1);
 
-/// What brains say when a component is in trouble of its own.
-const TROUBLE: [&str; 6] =
-    ["exited", "hung", "error", "condition-raised", "move-started", "restart"];
+/// What brains say when a component is in trouble of its own. A lease that ends in bad weather
+/// is one: the process stays and waits for a sign.
+const TROUBLE: [&str; 7] = [
+    "exited",
+    "hung",
+    "error",
+    "condition-raised",
+    "move-started",
+    "restart",
+    "isolated-deactivated",
+];
+/// What they say of a home that is silent, and of its next one.
+const CHOICES: [&str; 2] = ["placed", "promoted"];
 
 /// `restarted-by-heal`.
 #[derive(Debug, Default)]
@@ -42,7 +55,7 @@ impl Checker for Heals {
             self.excuse(fleet, system, None);
         }
         if let Sight::Told { event, .. } = sight
-            && let (Some(system), true) = (&event.system, TROUBLE.contains(&event.kind.as_str()))
+            && let (Some(system), true) = (&event.system, self.excuses(fleet, &event.kind))
         {
             self.excuse(fleet, system, event.component.as_ref());
         }
@@ -65,6 +78,12 @@ fn is_right(fleet: &Fleet, component: usize, active: &[ActiveProcess]) -> bool {
 }
 
 impl Heals {
+    /// Whether a component of which a brain says this now need not go on where it ran.
+    fn excuses(&self, fleet: &Fleet, kind: &str) -> bool {
+        let just_healed = self.healed_at.is_some_and(|at| fleet.now < at + HEARS_WITHIN);
+        TROUBLE.contains(&kind) || (just_healed && CHOICES.contains(&kind))
+    }
+
     fn excuse(&mut self, fleet: &Fleet, system: &Name, component: Option<&Name>) {
         self.before.retain(|number, _| {
             let key = fleet.key(*number);

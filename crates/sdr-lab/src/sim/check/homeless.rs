@@ -72,7 +72,8 @@ impl Homeless {
                 let runs_here = |active: &crate::sim::ActiveProcess| side.contains(&active.robot);
                 // who has a lease may not act alone, and its successor waits for its end
                 let lease = fleet.lease(&key, &side);
-                let must_not = alone && lease.is_some();
+                let must_not =
+                    (alone && lease.is_some()) || !fleet.is_whole(key.system.as_str(), &side);
                 let patience = lease.map_or(DETECTION, |lease| DETECTION.max(lease + LEASE_OVER));
                 let runs = fleet.active(&key).iter().any(runs_here);
                 if must_not || runs || !fleet.is_feasible(&key, &side) {

@@ -14,6 +14,9 @@ use crate::sim::{Broken, Checker, Fleet, Sight};
 /// A successor waits so much longer than the lease: until then the home must have stopped.
 const MARGIN: Duration = Duration::from_secs(1);
 
+/// What brains say when they choose a home, the coordinator and a standby that follows.
+const CHOICES: [&str; 2] = ["placed", "promoted"];
+
 /// Larger fleets are not watched pair by pair.
 const ROBOTS_MAX: usize = 50;
 
@@ -25,7 +28,7 @@ const ROBOTS_MAX: usize = 50;
 pub struct Leases {
     /// Since when two robots, the lesser one first, have been apart at every look.
     apart: BTreeMap<(usize, usize), Instant>,
-    /// When a robot said last that it placed a component.
+    /// When a robot said last that it placed a component, or followed its home.
     placed: BTreeMap<(usize, ComponentKey), Instant>,
 }
 
@@ -35,7 +38,7 @@ impl Checker for Leases {
             return self.both_act(fleet, *robot, *component, token);
         }
         if let Sight::Told { robot, event } = sight
-            && event.kind == "placed"
+            && CHOICES.contains(&event.kind.as_str())
             && let (Some(system), Some(name)) = (&event.system, &event.component)
         {
             self.placed.insert((*robot, ComponentKey::new(system, name)), fleet.now);
@@ -118,9 +121,11 @@ impl Leases {
     }
 }
 
-/// How long a component may act unheard on a robot, as that robot knows it.
+/// How long a component may act unheard on a robot, as that robot knows it: of an edition that
+/// is still arriving it obeys nothing yet.
 fn lease(fleet: &Fleet, robot: usize, key: &ComponentKey) -> Option<Duration> {
-    fleet.lease(key, &[robot])
+    let lease = fleet.lease(key, &[robot])?;
+    fleet.is_whole(key.system.as_str(), &[robot]).then_some(lease)
 }
 
 /// Since when nobody can hear a robot and be heard, unless its agent stood still meanwhile.

@@ -40,6 +40,9 @@ impl Checker for Orders {
             let answers = *disk_kept && !self.forgetful.contains(robot);
             return answers.then(|| wire_before_disk(fleet, *robot)).flatten();
         }
+        if matches!(sight, Sight::Off { .. }) && fleet.remembers_nothing() {
+            self.values.clear();
+        }
         let robots = 0..fleet.robots.len();
         let tables = robots.clone().filter_map(|robot| fleet.table(robot));
         let few = || tables.map(FleetTable::len).sum::<usize>() <= RECORDS_MAX;
@@ -101,6 +104,21 @@ fn records(fleet: &Fleet, robot: usize) -> impl Iterator<Item = &FleetRecord> {
     })
 }
 
+/// Whether a standby chose itself under a number that its disk holds as used: it says so
+/// before the record is on disk (rule 4 of the order).
+fn is_reserved(fleet: &Fleet, robot: usize, record: &FleetRecord) -> bool {
+    let Some(epoch) = &record.version.epoch else { return false };
+    let (0, Ok(FleetValue::Assignment(assignment))) =
+        (record.version.revision, FleetValue::decode(record.key.kind, &record.value))
+    else {
+        return false;
+    };
+    let stored = fleet.robots[robot].disk.held();
+    let reserved = stored.and_then(|stored| stored.epochs.get(&assignment.component));
+    let here = assignment.home == fleet.robots[robot].id;
+    here && reserved.is_some_and(|reserved| epoch.number <= *reserved)
+}
+
 /// What a robot made and others hold must be on its own disk.
 fn wire_before_disk(fleet: &Fleet, robot: usize) -> Option<Broken> {
     let me = &fleet.robots[robot].id;
@@ -109,7 +127,7 @@ fn wire_before_disk(fleet: &Fleet, robot: usize) -> Option<Broken> {
     for other in others {
         let mine = records(fleet, other);
         let mine = mine.filter(|record| record.version.author == *me && !is_by_operator(record));
-        for record in mine {
+        for record in mine.filter(|record| !is_reserved(fleet, robot, record)) {
             if own.record(&record.key).is_none_or(|own| own.version < record.version) {
                 let what = format!(
                     "robot-{} holds {} {:?}, which {me} made and has not on its disk",

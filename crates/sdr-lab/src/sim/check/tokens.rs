@@ -19,6 +19,9 @@ impl Checker for Tokens {
     fn watch(&mut self, fleet: &Fleet, sight: &Sight) -> Option<Broken> {
         if let Sight::Off { robot } = sight {
             self.accepted.retain(|(of, ..), _| of != robot);
+            if fleet.remembers_nothing() {
+                self.used.clear();
+            }
         }
         if let Sight::Accepted { robot, instance, connection, token } = sight {
             let before = self.accepted.insert((*robot, *instance, *connection), token.clone())?;
