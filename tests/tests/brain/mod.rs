@@ -3,6 +3,7 @@
 mod again;
 mod deployment;
 mod policies;
+mod power;
 mod recovery;
 mod role;
 mod standby;

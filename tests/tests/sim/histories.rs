@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
+use sdr_core::recover::Cause;
 use sdr_lab::sim::{
-    DiskFate, Fault, Incident, Scenario, Setup, Telling, Way, Weather, check, systems,
+    Behaviour, DiskFate, Fault, Incident, Scenario, Setup, Telling, Way, Weather, check, systems,
 };
 
 /// Chances that each history is told under.
@@ -94,6 +95,35 @@ fn who_lost_its_disk_and_meets_one_that_missed_its_last_life_makes_no_number_twi
     ];
 
     assert_eq!(broken(3, 0.2, seconds(500), &incidents), Vec::<String>::new());
+}
+
+#[test]
+fn who_runs_nowhere_may_go_back_to_a_robot_it_left_not_long_ago() {
+    let fails = Some((Duration::from_millis(600), Cause::HardwareLost));
+    let behaviour = Behaviour { fail_after: fails, ..Behaviour::default() };
+    let component = String::from("c0");
+    let faded = |robot| Fault::Fade { robot, level_dbm: -84, time: seconds(91) };
+    // whichever of the two is home, it leaves it and fails on the other one
+    let ill = |robot| {
+        let (component, behaviour) = (component.clone(), behaviour.clone());
+        Fault::Behave { robot, component, behaviour, time: seconds(49) }
+    };
+    for home in [0, 1] {
+        let incidents =
+            [at(4300, deploy(0, 0, 3)), at(12_500, faded(home)), at(15_200, ill(1 - home))];
+
+        assert_eq!(broken(2, 0.05, seconds(500), &incidents), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn a_fleet_that_lost_all_its_disks_is_a_new_one() {
+    let incidents = [
+        at(48_500, power(0, seconds(15), DiskFate::Lost)),
+        at(48_800, power(1, seconds(12), DiskFate::Lost)),
+    ];
+
+    assert_eq!(broken(2, 0.2, seconds(520), &incidents), Vec::<String>::new());
 }
 
 #[test]

@@ -42,6 +42,17 @@ fn no_seed_breaks_a_rule() {
     assert!(found.is_empty(), "{} of {SEEDS} seeds:\n{}", found.len(), lines.join("\n"));
 }
 
+/// Seeds that once broke a rule.
+const ONCE_BROKEN: [u64; 10] = [236, 651, 1203, 1426, 1555, 1682, 1802, 5107, 7177, 9912];
+
+#[test]
+fn no_seed_breaks_a_rule_that_it_once_broke() {
+    let broken: Vec<Violation> =
+        ONCE_BROKEN.into_iter().flat_map(|seed| violations_of(seed..=seed)).collect();
+
+    assert_eq!(broken, Vec::new());
+}
+
 #[test]
 fn the_same_seed_leaves_the_same_trace() {
     for seed in 1..=5 {
