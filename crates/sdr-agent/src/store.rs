@@ -24,6 +24,8 @@ use crate::events::Events;
 const MAGIC: &[u8; 8] = b"SDRSTATE";
 const VERSION: u32 = 1;
 const HEADER_BYTES: usize = 20;
+/// Lists at the end of the state that the first builds of this version did not write.
+const LISTS_APPENDED: usize = 2;
 const FILE_NAME: &str = "state";
 
 /// What the disk held at the start.
@@ -247,7 +249,9 @@ fn decode(bytes: &[u8]) -> Result<StoredState, StateError> {
     if found != expected {
         return Err(StateError::Checksum { found, expected });
     }
-    postcard::from_bytes(content).map_err(StateError::Content)
+    // an older build wrote fewer lists: those that were appended since are empty
+    let padded = [content, &[0; LISTS_APPENDED]].concat();
+    postcard::from_bytes(&padded).map_err(StateError::Content)
 }
 
 #[cfg(test)]

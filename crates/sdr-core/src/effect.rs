@@ -1,6 +1,12 @@
 //! Everything the brain can ask for. What came of it returns as the next input.
 
-use alloc::{boxed::Box, collections::BTreeMap, string::String, sync::Arc, vec::Vec};
+use alloc::{
+    boxed::Box,
+    collections::{BTreeMap, BTreeSet},
+    string::String,
+    sync::Arc,
+    vec::Vec,
+};
 use core::net::SocketAddr;
 
 use serde::{Deserialize, Serialize};
@@ -152,6 +158,9 @@ pub struct StoredState {
     /// Epochs reserved per component: numbers up to this one may have been sent.
     #[serde(default)]
     pub epochs: BTreeMap<ComponentKey, u64>,
+    /// Robots ever heard of.
+    #[serde(default)]
+    pub robots: BTreeSet<RobotId>,
 }
 
 impl StoredState {
@@ -169,6 +178,7 @@ impl StoredState {
         }
         self.runs.extend(change.runs);
         self.epochs.extend(change.epochs);
+        self.robots.extend(change.robots);
         if let Some(peers) = change.peers {
             self.peers = peers;
         }
@@ -192,4 +202,6 @@ pub struct StoredChange {
     pub epochs: Vec<(ComponentKey, u64)>,
     /// All peers, when there are others than before.
     pub peers: Option<Vec<SocketAddr>>,
+    /// Robots heard of for the first time.
+    pub robots: Vec<RobotId>,
 }

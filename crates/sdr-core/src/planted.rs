@@ -58,11 +58,13 @@ pub enum Defect {
     LeaseNeverEnds,
     /// A successor is chosen before the lease of the home is over.
     LeaseNotAwaited,
+    /// Tombstones are dropped before everybody has them on disk.
+    BuriedTooSoon,
 }
 
 impl Defect {
     /// All that must be caught.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 27] = [
         Self::NoEpochCheck,
         Self::WireBeforeDisk,
         Self::TermNotStored,
@@ -87,6 +89,9 @@ impl Defect {
         Self::ForgottenReused,
         Self::LeaseNeverEnds,
         Self::LeaseNotAwaited,
+        Self::NoWitness,
+        Self::EpochNotReserved,
+        Self::BuriedTooSoon,
     ];
 }
 

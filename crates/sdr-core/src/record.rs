@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     fitness::RolePolicy,
     id::{ComponentKey, Name, RobotId},
+    order::hash64,
     spec::{ComponentSpec, ConnectionSpec, PolicyBytes},
 };
 
@@ -38,6 +39,8 @@ impl RecordKind {
     pub const ROLE: Self = Self(7);
     /// [`RolePolicy`], keyed by nothing.
     pub const ROLE_POLICY: Self = Self(10);
+    /// [`HorizonRecord`], keyed by nothing.
+    pub const HORIZON: Self = Self(15);
 }
 
 /// Names one shared fact.
@@ -118,6 +121,35 @@ pub struct RoleRecord {
     pub by_operator: bool,
 }
 
+/// What was undeployed so long ago that every robot has it on disk, and nobody keeps any more.
+///
+/// A system not among the survivors, of this revision or an older one, is buried: its records
+/// are dropped and refused. Revisions of systems that are deployed anew begin above it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HorizonRecord {
+    /// The greatest revision of a tombstone that was dropped.
+    pub revision: u64,
+    /// The greatest number of an epoch that was dropped with one.
+    pub epoch: u64,
+    /// [`HorizonRecord::word`] of each system that was not undeployed, sorted.
+    pub survivors: Vec<u32>,
+}
+
+impl HorizonRecord {
+    /// Most survivors, so that the record fits a datagram.
+    pub const SURVIVORS_MAX: usize = 180;
+
+    /// A system's name as survivors are listed.
+    pub fn word(system: &str) -> u32 {
+        u32::try_from(hash64(system.as_bytes()) >> 32).unwrap_or(0)
+    }
+
+    /// Whether a system of this revision is buried.
+    pub fn buries(&self, system: &str, revision: u64) -> bool {
+        revision <= self.revision && self.survivors.binary_search(&Self::word(system)).is_err()
+    }
+}
+
 /// A checked value of the fleet table; parts of systems are shared by all who look at them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FleetValue {
@@ -137,6 +169,8 @@ pub enum FleetValue {
     Role(RoleRecord),
     /// How its holder is chosen.
     RolePolicy(RolePolicy),
+    /// What is buried.
+    Horizon(HorizonRecord),
     /// A kind that this version does not know; kept and passed on.
     Unknown,
 }
@@ -156,6 +190,7 @@ impl FleetValue {
             RecordKind::ASSIGNMENT => take(bytes).map(Self::Assignment),
             RecordKind::ROLE => take(bytes).map(Self::Role),
             RecordKind::ROLE_POLICY => take(bytes).map(Self::RolePolicy),
+            RecordKind::HORIZON => take(bytes).map(Self::Horizon),
             _ => Ok(Self::Unknown),
         }
     }
@@ -170,6 +205,7 @@ impl FleetValue {
             Self::Assignment(value) => postcard::to_allocvec(value),
             Self::Role(value) => postcard::to_allocvec(value),
             Self::RolePolicy(value) => postcard::to_allocvec(value),
+            Self::Horizon(value) => postcard::to_allocvec(value),
             Self::Unknown => Ok(Vec::new()),
         };
         bytes.expect("writing plain data to memory cannot fail")

@@ -154,6 +154,15 @@ pub struct SuccessionReport {
     pub reason: String,
 }
 
+/// What a robot has on its disk, said while something is undeployed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredReport {
+    /// Hash of the fleet table there.
+    pub root: u64,
+    /// Every robot it ever heard of, also before its last start.
+    pub robots: Vec<RobotId>,
+}
+
 /// Everything an author may say, one record each.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Report {
@@ -171,4 +180,6 @@ pub enum Report {
     Homeless(Homeless),
     /// The coordinator's successors.
     Succession(SuccessionReport),
+    /// What is on disk.
+    Stored(StoredReport),
 }

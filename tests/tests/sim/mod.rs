@@ -3,3 +3,4 @@
 mod checkers;
 mod histories;
 mod seeds;
+mod tombstones;

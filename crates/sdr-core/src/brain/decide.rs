@@ -35,6 +35,7 @@ impl Brain {
         }
         self.plans.give_up_late(now);
         self.advance_moves(now);
+        self.consider_burial(now);
         if self.desk.is_minting() || self.plans.asked.is_some() || !self.may_begin(now) {
             return;
         }

@@ -35,6 +35,11 @@ impl Editions {
         self.arriving.entry(system.into()).or_insert(parts);
     }
 
+    /// Whether some of what is known is kept from the disk.
+    pub(super) fn are_arriving(&self) -> bool {
+        !self.arriving.is_empty()
+    }
+
     /// All of it is here, or nobody wants the system any more.
     pub(super) fn end(&mut self, system: &str) {
         if let Some(parts) = self.arriving.remove(system) {

@@ -41,7 +41,10 @@ impl Brain {
     /// The epoch that this robot mints after `before`.
     pub(super) fn next_epoch(&self, key: &ComponentKey, before: Option<&Epoch>) -> Epoch {
         let used = self.epochs.get(key).map_or(0, |book| book.last);
-        let known = before.map_or(0, |epoch| epoch.number).max(used);
+        let known = match before {
+            Some(epoch) => epoch.number.max(used),
+            None => self.mesh.fleet().epoch_floor().max(used),
+        };
         let number = self.number_after(RecordKind::ASSIGNMENT, &key.to_string(), known);
         Epoch { number, minted_by: self.me.clone() }
     }

@@ -178,7 +178,9 @@ impl Brain {
             self.desk.peers.clone_from(peers);
         }
         let incarnation = self.mesh.incarnation().counter;
-        StoredChange { whole, incarnation, facts, dropped, runs, epochs, peers }
+        let robots = self.robots_to_store(whole);
+        self.burial.root_in_flight = self.root_to_store();
+        StoredChange { whole, incarnation, facts, dropped, runs, epochs, peers, robots }
     }
 
     /// What is made here belongs on the disk before it is in the table.
@@ -210,6 +212,9 @@ impl Brain {
                 if let Some(book) = self.epochs.get_mut(&key) {
                     book.note_stored(number);
                 }
+            }
+            if let Some(root) = self.burial.root_in_flight.take() {
+                self.burial.root_stored = Some(root);
             }
             for (key, run) in core::mem::take(&mut self.desk.runs_in_flight) {
                 if let Some(book) = self.runs.get_mut(&key) {

@@ -10,6 +10,7 @@
 //! `decide` acts only on the coordinator, and only mints records; every robot `reconcile`s
 //! what should be on itself with what is. Nothing is ever told to another robot but records.
 
+mod burial;
 mod conditions;
 mod config;
 mod deadlines;
@@ -70,6 +71,7 @@ use crate::{
     report::{ConditionReport, HostReport},
     time::{Duration, Instant},
 };
+use burial::Burial;
 use editions::Editions;
 use epochs::EpochBook;
 use guard::GuardDesk;
@@ -155,6 +157,7 @@ pub struct Brain {
     left: BTreeMap<(ComponentKey, RobotId), Instant>,
     /// Homes that others chose lately: until when they have time to speak.
     homes_told: BTreeMap<ComponentKey, Instant>,
+    burial: Burial,
     desk: Desk,
     editions: Editions,
     desk_of_role: RoleDesk,
@@ -227,6 +230,7 @@ impl Brain {
             moves: BTreeMap::new(),
             left: BTreeMap::new(),
             homes_told: BTreeMap::new(),
+            burial: Burial::new(stored.robots),
             desk: Desk::default(),
             editions: Editions::default(),
             desk_of_role: RoleDesk::default(),

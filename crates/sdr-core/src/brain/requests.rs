@@ -69,6 +69,10 @@ impl Brain {
             );
             return self.refuse(request, text);
         }
+        if !self.mesh.fleet().has_room_for(records.len()) {
+            let text = format!("{name} takes {} records; the fleet's table is full", records.len());
+            return self.refuse(request, text);
+        }
         let text = format!("{name}, revision {revision}, {} components", system.components.len());
         let mut event = Event::new("deployed", &self.me, text);
         event.system = Some(name);
@@ -106,8 +110,13 @@ impl Brain {
         self.effects.push_back(Effect::Answer { request, result: Err(reason) });
     }
 
+    /// A system that is not wanted now begins above everything that was undeployed: what is
+    /// forgotten by all must not be taken for it.
     fn next_revision_of(&self, system: &Name, before: Option<u64>) -> u64 {
-        self.number_after(RecordKind::SYSTEM, system.as_str(), before.unwrap_or(0))
+        let wanted = self.systems.contains_key(system);
+        let floor = if wanted { 0 } else { self.mesh.fleet().revision_floor() };
+        let known = before.unwrap_or(0).max(floor);
+        self.number_after(RecordKind::SYSTEM, system.as_str(), known)
     }
 
     fn system_revision(&self, name: &Name) -> Option<u64> {

@@ -110,6 +110,7 @@ impl Brain {
         }
         self.say_host(now);
         self.say_links(now);
+        self.say_stored();
     }
 
     fn say_host(&mut self, now: Instant) {

@@ -58,7 +58,8 @@ impl Brain {
                     | Report::Link(..)
                     | Report::Instance(_)
                     | Report::Succession(_)
-                    | Report::Homeless(_) => None,
+                    | Report::Homeless(_)
+                    | Report::Stored(_) => None,
                 })
                 .collect(),
         }
@@ -146,6 +147,7 @@ impl Brain {
         let found = reports.find_map(|report| match report {
             Report::Homeless(homeless) if homeless.component == *key => Some(&homeless.refusals),
             Report::Homeless(_)
+            | Report::Stored(_)
             | Report::Succession(_)
             | Report::Facts(_)
             | Report::Host(_)

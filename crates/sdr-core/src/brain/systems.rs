@@ -55,6 +55,8 @@ impl SystemNow {
 pub(super) struct Changed {
     systems: BTreeSet<String>,
     assignments: BTreeSet<String>,
+    /// Systems may have been dropped from the table.
+    buried: bool,
 }
 
 impl Changed {
@@ -63,6 +65,7 @@ impl Changed {
             RecordKind::ASSIGNMENT => {
                 self.assignments.insert(key.name.clone());
             }
+            RecordKind::HORIZON => self.buried = true,
             RecordKind::SYSTEM
             | RecordKind::COMPONENT
             | RecordKind::CONNECTION
@@ -89,6 +92,9 @@ impl Brain {
     /// Puts together anew what changed.
     pub(super) fn refresh(&mut self, changed: &Changed) {
         let mut keys: BTreeSet<ComponentKey> = BTreeSet::new();
+        if changed.buried {
+            self.leave_buried(&mut keys);
+        }
         for name in &changed.systems {
             self.refresh_system(name, &mut keys);
         }
@@ -105,6 +111,21 @@ impl Brain {
         }
         if !changed.systems.is_empty() {
             self.unsay_unwanted();
+        }
+    }
+
+    /// Systems that this robot alone did not know to be dead.
+    fn leave_buried(&mut self, keys: &mut BTreeSet<ComponentKey>) {
+        let fleet = self.mesh.fleet();
+        let is_known = |name: &Name| fleet.get(RecordKind::SYSTEM, name.as_str()).is_some();
+        let buried: Vec<Name> =
+            self.systems.keys().filter(|name| !is_known(name)).cloned().collect();
+        for name in buried {
+            self.editions.end(name.as_str());
+            if let Some(system) = self.systems.remove(&name) {
+                keys.extend(system.keys());
+                self.spare_objector(&system.recovery);
+            }
         }
     }
 

@@ -96,7 +96,8 @@ impl Author {
             | Report::Instance(_)
             | Report::Condition(_)
             | Report::Homeless(_)
-            | Report::Succession(_) => None,
+            | Report::Succession(_)
+            | Report::Stored(_) => None,
         }
     }
 
@@ -109,7 +110,8 @@ impl Author {
             | Report::Instance(_)
             | Report::Condition(_)
             | Report::Homeless(_)
-            | Report::Succession(_) => None,
+            | Report::Succession(_)
+            | Report::Stored(_) => None,
         }
     }
 
@@ -122,7 +124,8 @@ impl Author {
             | Report::Link(..)
             | Report::Instance(_)
             | Report::Condition(_)
-            | Report::Homeless(_) => None,
+            | Report::Homeless(_)
+            | Report::Stored(_) => None,
         }
     }
 
@@ -135,7 +138,8 @@ impl Author {
             | Report::Link(..)
             | Report::Condition(_)
             | Report::Homeless(_)
-            | Report::Succession(_) => None,
+            | Report::Succession(_)
+            | Report::Stored(_) => None,
         })
     }
 
@@ -148,7 +152,8 @@ impl Author {
             | Report::Link(..)
             | Report::Instance(_)
             | Report::Homeless(_)
-            | Report::Succession(_) => None,
+            | Report::Succession(_)
+            | Report::Stored(_) => None,
         })
     }
 
@@ -161,7 +166,8 @@ impl Author {
             | Report::Instance(_)
             | Report::Condition(_)
             | Report::Homeless(_)
-            | Report::Succession(_) => None,
+            | Report::Succession(_)
+            | Report::Stored(_) => None,
         })
     }
 

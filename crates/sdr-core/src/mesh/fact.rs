@@ -109,6 +109,7 @@ impl Fact {
             | FleetValue::Recovery(_)
             | FleetValue::Role(_)
             | FleetValue::RolePolicy(_)
+            | FleetValue::Horizon(_)
             | FleetValue::Unknown => None,
         }
     }

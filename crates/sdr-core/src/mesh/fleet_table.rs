@@ -1,6 +1,6 @@
 //! What the fleet agrees on: key -> (version, value), merged by greatest version.
 
-use alloc::{collections::BTreeSet, sync::Arc, vec::Vec};
+use alloc::{collections::BTreeSet, string::String, sync::Arc, vec::Vec};
 
 use super::{
     commons::Commons,
@@ -12,11 +12,11 @@ use super::{
 use crate::{
     order::Version,
     planted::{self, Defect},
-    record::{FleetKey, FleetValue, RecordKind, RoleRecord},
+    record::{FleetKey, FleetValue, HorizonRecord, RecordKind, RoleRecord},
 };
 
 /// Most records; more are refused.
-const RECORDS_MAX: usize = 65_536;
+pub(super) const RECORDS_MAX: usize = 65_536;
 /// Changes kept for the disk; when there are more, all is told anew.
 const UNSAVED_MAX: usize = 65_536;
 
@@ -41,6 +41,10 @@ pub struct FleetTable {
     tree: FleetTree,
     /// Looked at with every input.
     role: Option<Arc<Fact>>,
+    /// What is buried.
+    horizon: Option<Arc<Fact>>,
+    /// Systems that were undeployed.
+    pub(super) dead: BTreeSet<String>,
     /// What changed since it was told last, for the disk.
     unsaved: Vec<Arc<Fact>>,
     unsaved_all: bool,
@@ -106,15 +110,18 @@ impl FleetTable {
             | FleetValue::Assignment(_)
             | FleetValue::Role(_)
             | FleetValue::RolePolicy(_)
+            | FleetValue::Horizon(_)
             | FleetValue::Unknown => None,
         };
+        let buries = matches!(fact.value(), FleetValue::Horizon(_));
         if let Some(commons) = &self.commons {
             commons.keep_fact(&fact);
         }
         self.put(fact);
-        if planted::is(Defect::TombstoneDropped) {
-            self.drop_tombstones();
+        if buries {
+            self.bury();
         }
+        self.drop_tombstones();
         if let Some((name, version)) = system {
             self.drop_parts_before(&name, &version);
         }
@@ -123,7 +130,8 @@ impl FleetTable {
 
     /// What would come of merging a fact.
     pub fn judge(&self, fact: &Fact) -> Merge {
-        if self.is_outdated(fact.record()) {
+        let buried = || self.is_buried(fact.key(), fact.version(), fact.value());
+        if self.is_outdated(fact.record()) || buried() {
             return Merge::Older;
         }
         let known = self.find(fact.hash(), fact.key().kind, &fact.key().name);
@@ -161,6 +169,23 @@ impl FleetTable {
             | FleetValue::Recovery(_)
             | FleetValue::Assignment(_)
             | FleetValue::RolePolicy(_)
+            | FleetValue::Horizon(_)
+            | FleetValue::Unknown => None,
+        }
+    }
+
+    /// What was buried last.
+    pub fn horizon(&self) -> Option<&HorizonRecord> {
+        match self.horizon.as_ref()?.value() {
+            FleetValue::Horizon(horizon) => Some(horizon),
+            FleetValue::System(_)
+            | FleetValue::Component(_)
+            | FleetValue::Connection(_)
+            | FleetValue::Allocation(_)
+            | FleetValue::Recovery(_)
+            | FleetValue::Assignment(_)
+            | FleetValue::Role(_)
+            | FleetValue::RolePolicy(_)
             | FleetValue::Unknown => None,
         }
     }
@@ -181,7 +206,8 @@ impl FleetTable {
             let name = system_of_part(key)?;
             self.find(key_hash(RecordKind::SYSTEM, name), RecordKind::SYSTEM, name)
         };
-        self.fact(key).or_else(system).map(|fact| fact.record())
+        let horizon = || self.find(key_hash(RecordKind::HORIZON, ""), RecordKind::HORIZON, "");
+        self.fact(key).or_else(system).or_else(horizon).map(|fact| fact.record())
     }
 
     /// All records, by key.
@@ -324,6 +350,15 @@ impl FleetTable {
         if fact.key().kind == RecordKind::ROLE && fact.key().name.is_empty() {
             self.role = Some(Arc::clone(&fact));
         }
+        if fact.key().kind == RecordKind::HORIZON && fact.key().name.is_empty() {
+            self.horizon = Some(Arc::clone(&fact));
+        }
+        if let FleetValue::System(system) = fact.value() {
+            match system.wanted {
+                true => self.dead.remove(&fact.key().name),
+                false => self.dead.insert(fact.key().name.clone()),
+            };
+        }
         self.note_unsaved(&fact);
         if let Some(before) = self.facts.put(fact) {
             self.tree.toggle(before.hash(), before.stamp());
@@ -338,22 +373,13 @@ impl FleetTable {
         }
     }
 
-    /// What no table may do: see [`Defect::TombstoneDropped`].
-    fn drop_tombstones(&mut self) {
-        let is_dead = |value: &FleetValue| matches!(value, FleetValue::System(s) if !s.wanted);
-        let dead: Vec<FleetKey> = self
-            .facts
-            .iter()
-            .filter(|fact| is_dead(fact.value()))
-            .map(|fact| fact.key().clone())
-            .collect();
-        dead.iter().for_each(|key| self.drop_fact(key));
-    }
-
-    fn drop_fact(&mut self, key: &FleetKey) {
+    pub(super) fn drop_fact(&mut self, key: &FleetKey) {
         if let Some(fact) = self.facts.remove(key) {
             self.tree.toggle(fact.hash(), fact.stamp());
             self.by_hash.remove(&fact);
+            if fact.key().kind == RecordKind::SYSTEM {
+                self.dead.remove(&fact.key().name);
+            }
             self.note_unsaved(&fact);
         }
     }
@@ -373,7 +399,7 @@ impl FleetTable {
 }
 
 /// The system whose part a record is.
-fn system_of_part(key: &FleetKey) -> Option<&str> {
+pub(super) fn system_of_part(key: &FleetKey) -> Option<&str> {
     let part = matches!(
         key.kind,
         RecordKind::COMPONENT

@@ -7,7 +7,7 @@ use alloc::{collections::BTreeSet, vec::Vec};
 use core::{net::SocketAddr, time::Duration};
 
 use super::{Incarnation, Mesh, Section, author_table::Seat};
-use crate::{order::hash64, time::Instant};
+use crate::{id::RobotId, order::hash64, time::Instant};
 
 /// Lives with this counter or a greater one follow a lost disk: others may hold numbers of
 /// this robot's making that it does not know of.
@@ -59,6 +59,17 @@ impl Mesh {
     /// making.
     pub fn may_have_forgotten(&self) -> bool {
         self.own.counter >= FORGETFUL_FROM || (self.is_newborn() && !self.is_new())
+    }
+
+    /// Whether somebody was heard from each configured peer since the start.
+    pub fn has_heard_seeds(&self) -> bool {
+        self.seeds().all(|seed| self.peers.seat_at(seed).is_some())
+    }
+
+    /// Whether `robot` never lost its disk, as far as is known.
+    pub fn remembers_all(&self, robot: &RobotId) -> bool {
+        let author = self.authors.author(robot);
+        author.is_some_and(|author| author.incarnation.counter < FORGETFUL_FROM)
     }
 
     /// Whether everybody it was to begin with is in its first life too, and does not know it.

@@ -39,6 +39,7 @@ mod saying;
 mod spread;
 #[cfg(test)]
 mod tests;
+mod tombs;
 mod view;
 mod wire;
 

@@ -47,6 +47,11 @@ impl AuthorKey {
         Self(String::from("s"))
     }
 
+    /// The key of what a robot says of its disk.
+    pub fn stored() -> Self {
+        Self(String::from("d"))
+    }
+
     /// The key of what was measured of the link to `robot`.
     pub fn link(robot: &RobotId) -> Self {
         Self(format!("l/{robot}"))
@@ -61,6 +66,7 @@ impl AuthorKey {
             Report::Condition(condition) => Self::condition(&condition.system, condition.cause),
             Report::Succession(_) => Self::succession(),
             Report::Homeless(homeless) => Self::homeless(&homeless.component),
+            Report::Stored(_) => Self::stored(),
         }
     }
 }
@@ -121,7 +127,11 @@ impl Spoken {
             Some(Report::Instance(instance)) => self.components.push(instance.component.clone()),
             Some(Report::Condition(_)) => self.conditions = true,
             Some(
-                Report::Host(_) | Report::Link(..) | Report::Succession(_) | Report::Homeless(_),
+                Report::Host(_)
+                | Report::Link(..)
+                | Report::Succession(_)
+                | Report::Homeless(_)
+                | Report::Stored(_),
             )
             | None => {}
         }

@@ -148,7 +148,8 @@ impl Bench {
             | Report::Instance(_)
             | Report::Condition(_)
             | Report::Succession(_)
-            | Report::Homeless(_) => None,
+            | Report::Homeless(_)
+            | Report::Stored(_) => None,
         })
     }
 }

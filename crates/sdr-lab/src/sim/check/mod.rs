@@ -9,6 +9,7 @@ mod leases;
 mod orders;
 mod scramble;
 mod tokens;
+mod tombs;
 
 pub mod convergence;
 
@@ -21,6 +22,7 @@ pub use leases::Leases;
 pub use orders::Orders;
 pub use scramble::Scramble;
 pub use tokens::Tokens;
+pub use tombs::Tombs;
 
 use super::Checker;
 
@@ -35,6 +37,7 @@ pub(crate) fn all() -> Vec<Box<dyn Checker>> {
         Box::<Scramble>::default(),
         Box::<Heals>::default(),
         Box::<Deployments>::default(),
+        Box::<Tombs>::default(),
         Box::<Bounds>::default(),
     ]
 }

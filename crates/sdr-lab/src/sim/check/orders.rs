@@ -19,8 +19,8 @@ const RECORDS_MAX: usize = 20_000;
 /// `order-went-back`, `wire-before-disk`, `version-twice`.
 #[derive(Debug, Default)]
 pub struct Orders {
-    /// By robot: the start of its agent, and the versions it held then.
-    held: BTreeMap<usize, (u64, BTreeMap<FleetKey, Version>)>,
+    /// By robot: the start of its agent, and the records it held then.
+    held: BTreeMap<usize, (u64, BTreeMap<FleetKey, FleetRecord>)>,
     /// By robot: its life and the hash of its table at the last look; an equal one holds
     /// nothing new.
     roots: BTreeMap<usize, (u64, u64)>,
@@ -60,14 +60,15 @@ impl Orders {
         if self.roots.insert(robot, root) == Some(root) {
             return None;
         }
-        let now: BTreeMap<FleetKey, Version> = records(fleet, robot)
-            .map(|record| (record.key.clone(), record.version.clone()))
-            .collect();
+        let now: BTreeMap<FleetKey, FleetRecord> =
+            records(fleet, robot).map(|record| (record.key.clone(), record.clone())).collect();
         let (then, before) = self.held.insert(robot, (life, now.clone())).unwrap_or_default();
-        let back = before
-            .iter()
-            .find(|(key, version)| then == life && now.get(*key).is_none_or(|now| now < *version));
-        if let Some((key, version)) = back {
+        let is_back = |record: &&FleetRecord| match now.get(&record.key) {
+            Some(now) => now.version < record.version,
+            None => !is_buried(fleet, robot, record),
+        };
+        let back = before.values().filter(|_| then == life).find(is_back);
+        if let Some(FleetRecord { key, version, .. }) = back {
             let what = format!("robot-{} held {} {version:?}", robot + 1, key.name);
             return Some(Broken::new("order-went-back", what));
         }
@@ -119,6 +120,13 @@ fn is_reserved(fleet: &Fleet, robot: usize, record: &FleetRecord) -> bool {
     here && reserved.is_some_and(|reserved| epoch.number <= *reserved)
 }
 
+/// Whether a robot dropped a record because everybody knew its system to be undeployed.
+fn is_buried(fleet: &Fleet, robot: usize, record: &FleetRecord) -> bool {
+    let value = FleetValue::decode(record.key.kind, &record.value);
+    let (Some(table), Ok(value)) = (fleet.table(robot), value) else { return false };
+    table.is_buried(&record.key, &record.version, &value)
+}
+
 /// What a robot made and others hold must be on its own disk.
 fn wire_before_disk(fleet: &Fleet, robot: usize) -> Option<Broken> {
     let me = &fleet.robots[robot].id;
@@ -128,7 +136,8 @@ fn wire_before_disk(fleet: &Fleet, robot: usize) -> Option<Broken> {
         let mine = records(fleet, other);
         let mine = mine.filter(|record| record.version.author == *me && !is_by_operator(record));
         for record in mine.filter(|record| !is_reserved(fleet, robot, record)) {
-            if own.record(&record.key).is_none_or(|own| own.version < record.version) {
+            let lacks = own.record(&record.key).is_none_or(|own| own.version < record.version);
+            if lacks && !is_buried(fleet, robot, record) {
                 let what = format!(
                     "robot-{} holds {} {:?}, which {me} made and has not on its disk",
                     other + 1,
